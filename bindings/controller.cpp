@@ -377,10 +377,6 @@ void bind_controller(nb::module_& m) {
             if (is_made != geometry.is_none()) {
               throw nb::value_error("attach: give a name and a geometry, or an Attachment alone");
             }
-            if (!is_made && nb::isinstance(geometry, nb::module_::import_("sidestep.obstacles").attr("Plane"))) {
-              throw nb::value_error((std::string("attach ") + nb::repr(object).c_str() + ": a Plane has no end and cannot be held, "
-                                     "allowed: Box, Capsule, Cylinder, MeshShape, Sphere, or points (N, 3)").c_str());
-            }
             const Attachment made = is_made ? nb::cast<Attachment>(object)
                                             : nb::cast<Attachment>(nb::module_::import_("sidestep.arm.attachment")
                                                                        .attr("attachment")(object, geometry, **options));

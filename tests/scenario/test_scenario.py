@@ -20,6 +20,7 @@ from sidestep.scenario.config import OPTIONAL
 from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.torque_program import program_from, torque_qp_of
 from sidestep.scenario.validation import check_document
+from sidestep.shapes import Sphere
 
 BASE = """\
 format: 1
@@ -59,7 +60,7 @@ def test_every_value_of_a_file_arrives() -> None:
     assert (scenario.goal.unit, scenario.goal.position) == ("rad", (0.5, 0.25))
     assert scenario.body == module.BodyConfig(components=3, covariance="diagonal", seed=7)
     (ball,) = scenario.obstacles
-    assert ball.shape == module.Shape("sphere", radius=0.05)
+    assert ball.shape == Sphere(0.05)
     assert ball.motion == module.StraightMove(to=(0.9, 0.2, 0.0), begin=1.0, end=2.0)
     assert (ball.points, ball.free, ball.spacing) == ("surface", False, 0.03)
     assert scenario.system.stiffness == 2.0

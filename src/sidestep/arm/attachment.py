@@ -14,14 +14,13 @@ from scipy.spatial import ConvexHull, QhullError
 from sidestep import _core
 from sidestep.body.cover_problem import EFFORTS, LinkProblem
 from sidestep.body.cover_refine import Ellipsoids
-from sidestep.obstacles.shapes import Capsule, Cylinder, Shape, Sphere, is_shape
 from sidestep.robot.pose import checked_pose
+from sidestep.shapes import KINDS, Shape, Sphere, is_shape
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
 COMPONENTS = 8  # ellipsoids of an object
 THINNEST = 5e-4  # [m] of half an extent: what has no thickness is taken to have twice that
-SECTIONS = 64  # of the meshes of round shapes
 
 
 def attachment(
@@ -58,6 +57,11 @@ def attachment(
         ValueError: names what is wrong: points that are not finite or too few, a value out of range, a pose that is
             none.
     """
+    if isinstance(geometry, Shape) and not geometry.bounded:
+        raise ValueError(
+            f"attach {name!r}: a {type(geometry).__name__} has no end and cannot be held, allowed: "
+            f"{', '.join(sorted(kind.__name__ for kind in KINDS.values() if kind.bounded))}, or points (N, 3)"
+        )
     X = np.eye(4) if pose is None else checked_pose(pose, f"attach {name!r}: pose")
     if not (np.isfinite(radius) and radius >= 0.0):
         raise ValueError(f"attach {name!r}: radius is {radius}, must be finite and not negative [m]")
@@ -90,9 +94,8 @@ def _cover(name: str, geometry: Shape | ArrayLike, components: int) -> tuple[Ell
         return ball, np.asarray(geometry.mesh().triangles, dtype=np.float64)
     if is_shape(geometry):
         mesh = geometry.mesh()
-        triangles, outside = np.asarray(mesh.triangles, dtype=np.float64), 0.0
-        if isinstance(geometry, Cylinder | Capsule):  # corners on the surface: its bulge is outside
-            outside = geometry.radius * (1.0 - np.cos(np.pi / SECTIONS) ** 2)
+        triangles = np.asarray(mesh.triangles, dtype=np.float64)
+        outside = geometry.bulge if isinstance(geometry, Shape) else 0.0
     else:
         triangles, outside = _hull(name, np.asarray(geometry, dtype=np.float64)), 0.0
     if not len(triangles) or not np.isfinite(triangles).all():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from functools import cache, partial
 from pathlib import Path
@@ -260,9 +260,7 @@ def maker_and_judge(robot: str) -> tuple[EncounterMaker, EncounterJudge]:
 def _shape(solid: SceneObject, time: float, velocity: Array) -> Shape:
     """As the controller is told of it."""
     pose = solid.pose_at(time)
-    if solid.kind == "capsule":
-        return Capsule(solid.size[0], solid.size[1], pose, velocity=velocity, name=solid.name)
-    return Sphere(solid.size[0], pose, velocity=velocity, name=solid.name)
+    return replace(solid.shape, pose=pose, velocity=velocity, name=solid.name)  # type: ignore[type-var]
 
 
 def _random_rotation(rng: np.random.Generator) -> Array:

@@ -12,6 +12,7 @@ from sidestep.distance.scene import Scene, check_scene
 from sidestep.distance.solid import object_solid
 from sidestep.robot import Robot
 from sidestep.robot.pose import pose_at
+from sidestep.shapes import KINDS
 
 Array = npt.NDArray[np.float64]
 
@@ -35,9 +36,10 @@ class EllipsoidClearance:
         self.robot = robot
         self.objects = check_scene(objects)
         for item in self.objects:
-            if item.kind == "mesh":
+            if item.shape.coal() is None:
+                solids = sorted(name for name, kind in KINDS.items() if kind.coal_class is not None)
                 raise ValueError(
-                    f"object {item.name!r} is a mesh; solids are needed: box, capsule, cylinder, plane, sphere"
+                    f"object {item.name!r} is a {item.kind}; solids are needed: {', '.join(solids)}"
                 )
         moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
         self._ellipsoids: list[tuple[str, coal.Ellipsoid, Array, float]] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -11,24 +12,14 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles, real_array
-from sidestep.obstacles import Box, Capsule, Cylinder, Plane, Shape, Sphere
-from sidestep.obstacles.shapes import is_shape
 from sidestep.robot.pose import checked_pose, pose_at
+from sidestep.shapes import KINDS, Fineness, Shape, Triangles, is_shape, kind_of
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["sphere", "box", "cylinder", "capsule", "plane", "mesh"]
 Motion = Literal["fixed", "free", "moving"]
 
+PICTURE = Fineness(subdivisions=2, sections=24)  # of a surface that is drawn
 AWAY = 100.0  # [m] below its place (a plane: behind), where waits what is not there: farther than arms reach
-
-_SIZE_MEANING: dict[str, tuple[int, str]] = {
-    "sphere": (1, "(radius,)"),
-    "box": (3, "the three side lengths"),
-    "cylinder": (2, "(radius, length)"),
-    "capsule": (2, "(radius, length)"),
-    "plane": (1, "(extent,)"),
-    "mesh": (0, "(), the mesh has its own size"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +28,9 @@ class SceneObject:
 
     Args:
         name: unique in a scene; contacts and clearances are reported under it.
-        kind: "sphere", "box", "cylinder" (axis: z), "capsule" (a ball rolled along z), "plane" (all below z = 0 is
-            solid, see `Plane`) or "mesh".
-        size: sphere (radius,), box three side lengths, cylinder (radius, length), capsule (radius, length between the
-            centres of its half-balls), plane (extent,) of what is seen and drawn of it, mesh () [m].
+        kind: "mesh", or that of a shape: "box", "plane" (all below z = 0 is solid), …
+        size: lengths of the shape [m] in the order of its class: of a `Box` three, of a `Cylinder` (radius, length),
+            of a `Plane` (extent,) of what is seen and drawn of it, …; mesh ().
         pose: (4, 4) pose of the object frame in the world at time 0.
         motion: "fixed"; "free" (a rigid body of `mass` that floats until something touches it); or
             "moving" (driven with `velocity` whatever it meets).
@@ -55,7 +45,7 @@ class SceneObject:
     """
 
     name: str
-    kind: Kind
+    kind: str
     size: tuple[float, ...] = ()
     pose: Array = field(default_factory=lambda: np.eye(4))
     motion: Motion = "fixed"
@@ -66,16 +56,13 @@ class SceneObject:
     mesh: trimesh.Trimesh | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(Kind):
-            raise ValueError(
-                f"object {self.name!r}: kind is {self.kind!r}, allowed: {', '.join(get_args(Kind))}"
-            )
+        kind = kind_of(self.kind, f"object {self.name!r}")
         if self.motion not in get_args(Motion):
             allowed = ", ".join(get_args(Motion))
             raise ValueError(f"object {self.name!r}: motion is {self.motion!r}, allowed: {allowed}")
         size = tuple(float(s) for s in self.size)
-        count, meaning = _SIZE_MEANING[self.kind]
-        if len(size) != count or not all(np.isfinite(s) and s > 0.0 for s in size):
+        number, meaning = _size_of(kind)
+        if len(size) != number or not all(np.isfinite(s) and s > 0.0 for s in size):
             raise ValueError(
                 f"object {self.name!r}: size of a {self.kind} is {meaning}, positive, got {self.size}"
             )
@@ -93,12 +80,17 @@ class SceneObject:
             raise ValueError(f"object {self.name!r}: present must be 0 <= from <= until, got {self.present}")
         if self.motion != "moving" and self.present != (0.0, float("inf")):
             raise ValueError(f"object {self.name!r}: only a moving object can come and go")
-        if self.kind == "plane" and self.motion == "free":
-            raise ValueError(f"object {self.name!r}: a plane has no mass, so that it cannot be free")
-        if (self.kind == "mesh") != (self.mesh is not None):
+        if not kind.bounded and self.motion == "free":
+            raise ValueError(f"object {self.name!r}: a {self.kind} has no mass, so that it cannot be free")
+        if (self.kind == Triangles.kind) != (self.mesh is not None):
             raise ValueError(f"object {self.name!r}: a mesh object needs `mesh`, and only it")
         for name, value in (("size", size), ("pose", pose), ("velocity", velocity)):
             object.__setattr__(self, name, value)
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The solid in the object frame."""
+        return KINDS[self.kind].of_lengths(self.size) if self.mesh is None else Triangles(self.mesh)
 
     @classmethod
     def ball(
@@ -148,26 +140,15 @@ class SceneObject:
             moves_during: (from, until) [s] in which a moving object moves.
         """
         velocity = np.asarray(shape.velocity if velocity is None else velocity, dtype=float)
-        kind: Kind = "mesh"
-        size: tuple[float, ...] = ()
-        mesh: trimesh.Trimesh | None = None
-        if isinstance(shape, Sphere):
-            kind, size = "sphere", (shape.radius,)
-        elif isinstance(shape, Box):
-            kind, size = "box", tuple(shape.size)
-        elif isinstance(shape, Cylinder):
-            kind, size = "cylinder", (shape.radius, shape.length)
-        elif isinstance(shape, Capsule):
-            kind, size = "capsule", (shape.radius, shape.length)
-        elif isinstance(shape, Plane):
-            kind, size = "plane", (shape.extent,)
-        else:
+        mesh = None
+        kind = shape.kind if isinstance(shape, Shape) else Triangles.kind
+        if kind == Triangles.kind:
             mesh = shape.mesh().copy()
             mesh.apply_transform(np.linalg.inv(shape.pose))
         return cls(
             name,
             kind,
-            size=size,
+            size=() if mesh is not None else shape.lengths,
             pose=shape.pose,
             motion=motion or ("moving" if np.any(velocity != 0.0) else "fixed"),
             mass=mass,
@@ -213,7 +194,7 @@ class SceneObject:
             start, end = self.moves_during
             pose[:3, 3] += self.velocity * max(0.0, min(time, end) - start)
             if not self.is_present(time):
-                pose[:3, 3] -= AWAY * (pose[:3, 2] if self.kind == "plane" else np.array([0.0, 0.0, 1.0]))
+                pose[:3, 3] -= AWAY * (np.array([0.0, 0.0, 1.0]) if self.shape.bounded else pose[:3, 2])
         return pose
 
     def is_present(self, time: float) -> bool:
@@ -222,35 +203,22 @@ class SceneObject:
 
     def surface(self, *, subdivisions: int = 2) -> trimesh.Trimesh:
         """The surface as triangles in the object frame; spheres as an icosphere of `subdivisions`."""
-        surface: trimesh.Trimesh
-        if self.mesh is not None:
-            surface = self.mesh
-        elif self.kind == "sphere":
-            surface = trimesh.creation.icosphere(subdivisions=subdivisions, radius=self.size[0])
-        elif self.kind == "box":
-            surface = trimesh.creation.box(extents=self.size)
-        elif self.kind == "cylinder":
-            surface = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1], sections=24)
-        elif self.kind == "capsule":
-            surface = Capsule(self.size[0], self.size[1]).mesh()
-        else:
-            surface = Plane(np.zeros(3), [0.0, 0.0, 1.0], extent=self.size[0]).mesh()
-        return surface
+        return self.shape.surface(replace(PICTURE, subdivisions=subdivisions))
 
     @property
     def bounding_radius(self) -> float:
-        """Largest distance [m] of a point of the object from the origin of its frame; infinite for a plane."""
-        if self.kind == "sphere":
-            return self.size[0]
-        if self.kind == "box":
-            return 0.5 * float(np.linalg.norm(self.size))
-        if self.kind == "cylinder":
-            return float(np.hypot(self.size[0], 0.5 * self.size[1]))
-        if self.kind == "capsule":
-            return self.size[0] + 0.5 * self.size[1]
-        if self.kind == "plane":
-            return float("inf")
-        return float(np.linalg.norm(self.surface().vertices, axis=1).max())
+        """The radius [m] of a ball around the origin of its frame that holds it."""
+        return self.shape.bounding_radius
+
+
+def _size_of(kind: type[Shape]) -> tuple[int, str]:
+    """How many lengths a kind has, and their names."""
+    given = kind.length_fields()
+    if not given:
+        return 0, "(), the mesh has its own size"
+    names = ", ".join(entry.name for entry in given) + ("," if len(given) == 1 else "")
+    number = sum(entry.number for entry in given)
+    return number, "the three side lengths" if (len(given), number) == (1, 3) else f"({names})"
 
 
 Item: TypeAlias = SceneObject | Shape | Obstacles

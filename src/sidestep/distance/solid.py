@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from sidestep.distance.scene import SceneObject
 from sidestep.robot.mesh import mesh_model
+from sidestep.shapes import Sphere
 
 Array = npt.NDArray[np.float64]
 
@@ -74,19 +75,15 @@ def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
 
 
 def object_solid(item: SceneObject) -> Solid:
-    if item.mesh is not None:
-        solid = mesh_solid(item.name, item.mesh)
-        return replace(solid, hull=hull_model(item.mesh.vertices) or solid.shape)
-    origin, bound = np.zeros(3), item.bounding_radius
-    if item.kind == "sphere":
-        point = coal.Sphere(POINT_RADIUS)
-        return Solid(item.name, point, item.size[0], None, origin, bound, point)
-    if item.kind == "plane":
-        half_space = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        return Solid(item.name, half_space, 0.0, None, origin, bound, half_space)
-    primitives = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule}
-    shape = primitives[item.kind](*item.size)
-    return Solid(item.name, shape, 0.0, None, origin, bound, shape)
+    exact, bound = item.shape.coal(), item.bounding_radius
+    if exact is None:
+        surface = item.shape.surface()
+        solid = mesh_solid(item.name, surface)
+        return replace(solid, hull=hull_model(surface.vertices) or solid.shape)
+    radius = 0.0
+    if isinstance(item.shape, Sphere):
+        exact, radius = coal.Sphere(POINT_RADIUS), item.shape.radius
+    return Solid(item.name, exact, radius, None, np.zeros(3), bound, exact)
 
 
 def penetration(

@@ -3,9 +3,9 @@
 from sidestep._core import Obstacles
 from sidestep.obstacles.cloud import load_point_cloud
 from sidestep.obstacles.scene import obstacles_from_shapes
-from sidestep.obstacles.shapes import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere
 from sidestep.obstacles.voxels import merge_in_voxels
 from sidestep.robot.pose import pose_at
+from sidestep.shapes import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere
 
 __all__ = [
     "Box",

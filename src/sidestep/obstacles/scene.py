@@ -9,9 +9,10 @@ from typing import TypeAlias
 import numpy as np
 
 from sidestep._core import Obstacles
-from sidestep.obstacles.ball_cover import EXCESS, check_excess
-from sidestep.obstacles.covering import check_spacing
-from sidestep.obstacles.shapes import Balls, Points, Shape, Sphere, is_shape
+from sidestep.shapes import Shape, Sphere, is_shape
+from sidestep.shapes.ball_cover import EXCESS, check_excess
+from sidestep.shapes.shape import Balls, Points
+from sidestep.shapes.surface_points import check_spacing
 
 Seen: TypeAlias = Obstacles | Shape | Sequence[Obstacles | Shape]
 
@@ -30,7 +31,7 @@ def obstacles_from_shapes(
     balls; nor does an arm get inside. There are two ways:
 
     - by default, few balls inside the solid that reach out of it by at most `excess`; a sphere is one ball, exact. Of
-      spheres, boxes, cylinders and capsules they fill the inside as well (sampled, not proven);
+      other shapes than meshes they fill the inside as well (sampled, not proven);
     - with `spacing`, balls of one `radius` around points of the surface, such that every other point of the surface is
       within `spacing` of one. They reach out of the solid by `radius`. A sphere is one ball all the same.
 

@@ -5,22 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sidestep.robot.matrices import determinant, product, transformed
 from sidestep.robot.mesh import MeshFile
+from sidestep.shapes import Fineness, Shape, Triangles, kind_of
 
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh
 
 Array = NDArray[np.float64]
-_SECTIONS = 64  # sides of a cylinder: 1 - cos(pi / 64) = 0.12 % of the radius is cut off
-_CAP_SECTIONS = 80  # of a capsule, around and along: less than 0.1 % of the radius is cut off
-_SUBDIVISIONS = 4  # of an icosahedron, 5120 triangles: 0.11 % of the radius is cut off at the largest
-GeometryKind = Literal["mesh", "box", "cylinder", "capsule", "sphere"]
+FINENESS = Fineness(subdivisions=4, sections=64, cap_sections=80)  # 0.12 % of a radius is cut off at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +41,17 @@ class Geometry:
     """A mesh file or a primitive shape, placed in a link frame.
 
     Args:
-        kind: "mesh", "box", "cylinder" (along z), "capsule" (along z) or "sphere".
+        kind: "mesh", or that of a shape: "box", "cylinder", …
         placement: pose (4, 4) of the shape in the link frame.
-        size: box: edge lengths (x, y, z); cylinder: (radius, length); capsule: the same, its length without the
-            caps; sphere: (radius,); mesh: (). [m]
+        size: lengths of the shape [m] in the order of its class: of a `Box` (x, y, z), of a `Cylinder` (radius,
+            length), …; mesh: ().
         path: the mesh file, None for a primitive.
         scale: factor per axis (3,) on the file's vertices, before `placement`.
         sweeps: of a part that something else drives: sets of poses (K, 4, 4) in the link frame. Between those of a set
             it may be anywhere: the convex hull of the shape at all of them stands for it. None: it is at rest.
     """
 
-    kind: GeometryKind
+    kind: str
     placement: Array
     size: tuple[float, ...] = ()
     path: Path | None = None
@@ -63,7 +61,7 @@ class Geometry:
     def mesh(self) -> trimesh.Trimesh:
         """The shape as triangles in the link frame [m]; loaded once, copy it before you change it.
 
-        Cylinders, capsules and spheres become inscribed polyhedra, less than 0.15 % of the radius inside the surface.
+        Round shapes become inscribed polyhedra, less than 0.15 % of the radius inside the surface.
 
         Raises:
             ValueError: the file holds no triangles or cannot be read as a mesh.
@@ -82,22 +80,17 @@ class Geometry:
         return MeshFile(self.path)
 
     @cached_property
+    def shape(self) -> Shape:
+        """The shape in its own frame; raises as `mesh`."""
+        if self.path is None:
+            return kind_of(self.kind, "geometry").of_lengths(self.size)
+        return Triangles(_placed(_in_metres(self.file), np.diag([*self.scale, 1.0])))
+
+    @cached_property
     def _mesh(self) -> trimesh.Trimesh:
         import trimesh
 
-        if self.path is not None:
-            mesh = _placed(_in_metres(self.file), np.diag([*self.scale, 1.0]))
-        elif self.kind == "box":
-            mesh = trimesh.creation.box(extents=self.size)
-        elif self.kind == "cylinder":
-            mesh = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1], sections=_SECTIONS)
-        elif self.kind == "capsule":
-            mesh = trimesh.creation.capsule(
-                radius=self.size[0], height=self.size[1], count=2 * [_CAP_SECTIONS]
-            )
-        else:
-            mesh = trimesh.creation.icosphere(radius=self.size[0], subdivisions=_SUBDIVISIONS)
-        mesh = _placed(mesh, self.placement)
+        mesh = _placed(self.shape.surface(FINENESS), self.placement)
         if self.sweeps:
             corners = np.asarray(mesh.convex_hull.vertices)
             hulls = [

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from sidestep.robot.link import Array, Geometry
 from sidestep.robot.pose import from_quaternion, pose_at
+from sidestep.shapes import KINDS
 from sidestep.storage.user_cache import cache_root
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
@@ -33,7 +34,7 @@ def shapes_of(
 ) -> tuple[list[Geometry], list[Geometry], list[str]]:
     """The shapes of a body that can collide, the others, and the kinds of those without volume (plane, hfield).
 
-    A geom can collide if its contype or conaffinity is not zero. A capsule becomes a cylinder and two spheres.
+    A geom can collide if its contype or conaffinity is not zero. Some shapes become several, see `Shape.parts`.
     """
     collisions: list[Geometry] = []
     visuals: list[Geometry] = []
@@ -56,23 +57,18 @@ def _kind(model: mujoco.MjModel, geom: int) -> str:
 def _shapes(model: mujoco.MjModel, geom: int) -> list[Geometry]:
     quaternion = np.array(model.geom_quat[geom], dtype=float)
     X = pose_at(model.geom_pos[geom], from_quaternion(quaternion / np.linalg.norm(quaternion)))
-    size = [float(length) for length in model.geom_size[geom]]
-    match _kind(model, geom):
-        case "box":
-            return [Geometry("box", X, size=(2.0 * size[0], 2.0 * size[1], 2.0 * size[2]))]
-        case "sphere":
-            return [Geometry("sphere", X, size=(size[0],))]
-        case "cylinder":
-            return [Geometry("cylinder", X, size=(size[0], 2.0 * size[1]))]
-        case "capsule":
-            ends = [X @ pose_at([0.0, 0.0, side * size[1]]) for side in (-1.0, 1.0)]
-            cylinder = Geometry("cylinder", X, size=(size[0], 2.0 * size[1]))
-            return [cylinder, *(Geometry("sphere", end, size=(size[0],)) for end in ends)]
+    match name := _kind(model, geom):
         case "ellipsoid":
-            return [Geometry("mesh", X, path=_unit_sphere(), scale=np.array(size))]
+            return [
+                Geometry("mesh", X, path=_unit_sphere(), scale=np.array(model.geom_size[geom], dtype=float))
+            ]
         case "mesh" | "sdf":
             return [Geometry("mesh", X, path=_mesh_file(model, int(model.geom_dataid[geom])))]
-    return []
+    kind = KINDS.get(name)
+    if kind is None or not kind.bounded:
+        return []
+    shape = kind.of_mujoco(model.geom_size[geom].tolist())
+    return [Geometry(part.kind, X @ X_part, size=part.lengths) for part, X_part in shape.parts()]
 
 
 def _mesh_file(model: mujoco.MjModel, mesh: int) -> Path:

@@ -105,17 +105,7 @@ def _check_origin(X: Array, owner: str, remarks: Remarks) -> None:
 
 def _edges(geometry: Geometry) -> tuple[float, ...]:
     """The edges [m] of the box around a shape; 0 for a mesh."""
-    match geometry.kind:
-        case "box":
-            return geometry.size
-        case "sphere":
-            return (2.0 * geometry.size[0],) * 3
-        case "cylinder":
-            return 2.0 * geometry.size[0], 2.0 * geometry.size[0], geometry.size[1]
-        case "capsule":
-            width = 2.0 * geometry.size[0]
-            return width, width, geometry.size[1] + width
-    return 0.0, 0.0, 0.0
+    return geometry.shape.extents if geometry.path is None else (0.0, 0.0, 0.0)
 
 
 def _vector(values: Sequence[float] | Array) -> str:

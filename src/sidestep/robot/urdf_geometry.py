@@ -14,8 +14,8 @@ from sidestep.robot.mesh_file import fault_of
 from sidestep.robot.references import resolve
 from sidestep.robot.remarks import Remarks
 from sidestep.robot.source import Description
+from sidestep.shapes import KINDS
 
-GEOMETRY_TYPES = ("mesh", "box", "cylinder", "capsule", "sphere")
 THICKNESS = (
     1e-3  # [m] of a shape that is written without one: thin against any arm, thick enough to be covered
 )
@@ -69,19 +69,26 @@ def shapes_of(element: ElementTree.Element, description: Description, owner: str
     return found
 
 
+def _allowed() -> list[str]:
+    """The elements that are shapes: a mesh, and solids, those of most lengths first."""
+    solids = [kind for kind in KINDS.values() if kind.bounded and kind.length_fields()]
+    solids.sort(key=lambda kind: -sum(entry.number for entry in kind.length_fields()))
+    return ["mesh", *(kind.kind for kind in solids)]
+
+
 def _geometries(
     element: ElementTree.Element, description: Description, owner: str, remarks: Remarks, found: Shapes
 ) -> list[Geometry]:
     where = f"{owner}: <{element.tag}>"
     container = element.find("geometry")
     inside = [] if container is None else [item for item in container if isinstance(item.tag, str)]
-    shapes = [item for item in inside if item.tag in GEOMETRY_TYPES]
+    shapes = [item for item in inside if item.tag in _allowed()]
     if not inside:
         remarks.add(NO_GEOMETRY, short(where))
         return []
     if not shapes:
         names = ", ".join(f"<{shape.tag}>" for shape in inside)
-        raise ValueError(f"{where}: <geometry> holds {names}; allowed: one of {', '.join(GEOMETRY_TYPES)}")
+        raise ValueError(f"{where}: <geometry> holds {names}; allowed: one of {', '.join(_allowed())}")
     for other in inside:
         if other not in shapes:
             remarks.add(NO_SHAPE, f"{short(where)} <{other.tag}>")
@@ -103,31 +110,27 @@ def _shape(
 ) -> Geometry | None:
     if shape.tag == "mesh":
         return _mesh(shape, X, description, owner, where, remarks, found)
-    if shape.tag == "box":
-        size = numbers(shape, "size", where, remarks, count=3)
-    elif shape.tag == "sphere":
-        size = (number(shape, "radius", where),)
-    else:
-        size = (number(shape, "radius", where), number(shape, "length", where))
+    kind = KINDS[shape.tag]
+    size: tuple[float, ...] = ()
+    for name, entries, *_ in kind.length_fields():
+        size += (
+            numbers(shape, name, where, remarks, count=entries)
+            if entries > 1
+            else (number(shape, name, where),)
+        )
     if min(size) < 0.0:
         raise ValueError(f"{where}: {shape.tag} dimensions {size} must not be negative")
     what = f"{short(where)} {shape.tag} {size}"
     if max(size) == 0.0:
         remarks.add(NO_SIZE, what)
         return None
-    if shape.tag == "capsule" and size[0] > 0.0:  # of length zero it is a sphere
-        return Geometry("capsule", X, size=size) if size[1] > 0.0 else Geometry("sphere", X, size=size[:1])
-    if min(size) == 0.0:
-        remarks.add(FLAT, what)
-        size = tuple(value or THICKNESS for value in size)
-    match shape.tag:
-        case "box":
-            return Geometry("box", X, size=size)
-        case "cylinder":
-            return Geometry("cylinder", X, size=size)
-        case "capsule":
-            return Geometry("capsule", X, size=size)
-    return Geometry("sphere", X, size=size)
+    if min(size) > 0.0:
+        return Geometry(shape.tag, X, size=size)
+    simpler = kind.where_flat(size)
+    if simpler is not None:
+        return Geometry(simpler.kind, X, size=simpler.lengths)
+    remarks.add(FLAT, what)
+    return Geometry(shape.tag, X, size=tuple(value or THICKNESS for value in size))
 
 
 def _mesh(

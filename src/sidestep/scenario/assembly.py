@@ -18,8 +18,7 @@ from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.body.cover_problem import EffortName
 from sidestep.distance import SceneObject
-from sidestep.distance.scene import Kind, check_scene
-from sidestep.obstacles.shapes import EXTENT
+from sidestep.distance.scene import check_scene
 from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
@@ -34,10 +33,11 @@ from sidestep.scenario.scenario import (
     PoseConfig,
     RobotConfig,
     Scenario,
-    Shape,
 )
+from sidestep.scenario.shape import MeshSource
 from sidestep.scenario.torque_program import torque_qp_of
 from sidestep.scenario.validation import ScenarioError
+from sidestep.shapes import Shape, Sphere
 from sidestep.simulation import ControllerDriver
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem
@@ -256,44 +256,21 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
     driven: Literal["moving", "fixed"] = "moving" if np.any(velocity != 0.0) else "fixed"
     motion: Literal["free", "moving", "fixed"] = "free" if item.free else driven
 
-    def solid(kind: Kind, size: tuple[float, ...] = (), mesh: trimesh.Trimesh | None = None) -> SceneObject:
-        return SceneObject(
-            name,
-            kind,
-            size=size,
-            pose=pose,
-            motion=motion,
-            velocity=velocity,
-            moves_during=interval,
-            mesh=mesh,
+    solid = partial(SceneObject, name, pose=pose, motion=motion, velocity=velocity, moves_during=interval)
+    if isinstance(shape, Shape):
+        return (solid(shape.kind, shape.lengths),)
+    if isinstance(shape, MeshSource):
+        return (solid(shape.kind, mesh=_mesh(scenario.file(shape.file), shape.scale)),)
+    cloud, radius = cloud_balls(shape, scenario.file(shape.file))
+    if len(cloud) > MAX_CLOUD_POINTS:
+        raise ValueError(
+            f"shape.file: {shape.file} gives {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated. A voxel, "
+            f"here {shape.voxel or 'none'}, merges those in a cell of that edge [m]"
         )
-
-    match shape:
-        case Shape(type="sphere", radius=float(radius)):
-            return (solid("sphere", (radius,)),)
-        case Shape(type="cylinder", radius=float(radius), length=float(length)):
-            return (solid("cylinder", (radius, length)),)
-        case Shape(type="capsule", radius=float(radius), length=float(length)):
-            return (solid("capsule", (radius, length)),)
-        case Shape(type="plane"):
-            return (solid("plane", (shape.extent or EXTENT,)),)
-        case Shape(type="box", size=(x, y, z)):
-            return (solid("box", (x, y, z)),)
-        case Shape(type="mesh", file=str(file)):
-            return (solid("mesh", mesh=_mesh(scenario.file(file), shape.scale or 1.0)),)
-        case Shape(type="points", file=str(file)):
-            cloud, radius = cloud_balls(shape, scenario.file(file))
-            if len(cloud) > MAX_CLOUD_POINTS:
-                raise ValueError(
-                    f"shape.file: {file} gives {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated. A voxel, "
-                    f"here {shape.voxel or 'none'}, merges those in a cell of that edge [m]"
-                )
-            ball = solid("sphere", (radius,))
-            return tuple(
-                replace(ball, name=f"{name}.{index}", pose=pose @ pose_at(point))
-                for index, point in enumerate(cloud)
-            )
-    raise AssertionError(f"the schema lets no other shape through, got {shape}")
+    ball = solid(Sphere.kind, (radius,))
+    return tuple(
+        replace(ball, name=f"{name}.{index}", pose=pose @ pose_at(point)) for index, point in enumerate(cloud)
+    )
 
 
 def _mesh(path: Path, scale: float) -> trimesh.Trimesh:

@@ -11,12 +11,12 @@ import trimesh
 
 from sidestep._core import Obstacles
 from sidestep.distance import SceneObject
-from sidestep.obstacles import Box, Capsule, Cylinder, Plane, load_point_cloud
-from sidestep.obstacles.covering import check_spacing, square
-from sidestep.obstacles.mesh_cover import mesh_balls
-from sidestep.obstacles.shapes import Balls
+from sidestep.obstacles import load_point_cloud
 from sidestep.robot.pose import moved
-from sidestep.scenario.scenario import Obstacle, Shape
+from sidestep.scenario.scenario import Obstacle
+from sidestep.scenario.shape import PointSource
+from sidestep.shapes import Sphere
+from sidestep.shapes.surface_points import check_spacing
 
 Array = npt.NDArray[np.float64]
 
@@ -41,21 +41,21 @@ def view_of(item: Obstacle, thing: SceneObject, *, bare: bool) -> View:
     if bare and item.points == "surface":
         points = _surface_points(item, thing)
         return View(thing, points, np.zeros(len(points)))
-    if bare or item.shape.type in ("sphere", "points"):
+    if bare or isinstance(item.shape, Sphere | PointSource):
         centre = np.zeros((1, 3)) if thing.mesh is None else thing.mesh.bounds.mean(axis=0, keepdims=True)
         has_size = not bare or item.points == "ball"
-        is_ball = has_size and thing.kind == "sphere"
-        return View(thing, centre, np.array([thing.size[0] if is_ball else 0.0]))
-    return View(thing, *_balls(thing, item.excess))
+        radius = thing.shape.radius if has_size and isinstance(thing.shape, Sphere) else 0.0
+        return View(thing, centre, np.array([radius]))
+    return View(thing, *thing.shape.balls(item.excess))
 
 
-def cloud_balls(shape: Shape, path: Path) -> tuple[Array, float]:
+def cloud_balls(shape: PointSource, path: Path) -> tuple[Array, float]:
     """Points (n, 3) of a shape of points in its frame, and the radius of all their balls [m]."""
     cloud = load_point_cloud(
         path,
-        radius=shape.radius or 0.0,
+        radius=shape.radius,
         voxel=shape.voxel,
-        scale=shape.scale or 1.0,
+        scale=shape.scale,
         viewpoint=shape.viewpoint,
     )
     return np.array(cloud.points), float(cloud.radii.max())
@@ -63,29 +63,13 @@ def cloud_balls(shape: Shape, path: Path) -> tuple[Array, float]:
 
 def _surface_points(item: Obstacle, thing: SceneObject) -> Array:
     """Points (n, 3) on the surface, about `item.spacing` apart; of a plane on its face."""
-    if thing.kind == "plane":
-        return square(thing.size[0], item.spacing)
+    if not thing.shape.bounded:
+        return thing.shape.surface_points(item.spacing)
     surface = thing.surface(subdivisions=3)
     check_spacing(item.spacing, area=float(surface.area), length=float(max(surface.extents)))
     count = max(12, round(surface.area / item.spacing**2))
     points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
     return np.asarray(points)
-
-
-def _balls(thing: SceneObject, excess: float) -> Balls:
-    """Centres (n, 3) and radii (n,) of balls that cover a solid, in its frame [m]."""
-    if thing.mesh is not None:
-        return mesh_balls(thing.mesh, excess)
-    match thing.kind:
-        case "box":
-            return Box(thing.size).balls(excess)
-        case "cylinder":
-            return Cylinder(thing.size[0], thing.size[1]).balls(excess)
-        case "capsule":
-            return Capsule(thing.size[0], thing.size[1]).balls(excess)
-        case "plane":
-            return Plane(np.zeros(3), [0.0, 0.0, 1.0], extent=thing.size[0]).balls(excess)
-    raise AssertionError(f"a {thing.kind} is seen as it is")
 
 
 def seen_at(views: tuple[View, ...], time: float) -> Obstacles:

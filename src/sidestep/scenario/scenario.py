@@ -14,7 +14,9 @@ from typing import Any, Literal
 import yaml
 
 from sidestep.scenario.config import MAX_LOOK_STEPS, Section, check_steps, section_of, value_in
+from sidestep.scenario.shape import ObstacleShape, PointSource, document_of, shape_of
 from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
+from sidestep.shapes import Shape, Sphere
 
 Vector3 = tuple[float, float, float]
 Locked = dict[str, float | str | tuple[float, float]]  # values, names of postures, ranges
@@ -89,21 +91,6 @@ class BodyConfig:
 
 
 @dataclass(frozen=True)
-class Shape:
-    """A sphere, box, cylinder, capsule, plane, mesh file or point file; sizes in metres."""
-
-    type: Literal["sphere", "box", "cylinder", "capsule", "plane", "mesh", "points"]
-    radius: float | None = None
-    length: float | None = None
-    size: Vector3 | None = None
-    extent: float | None = None
-    file: str | None = None
-    scale: float | None = None
-    voxel: float | None = None
-    viewpoint: bool = False
-
-
-@dataclass(frozen=True)
 class StraightMove:
     """From the obstacle's position to `to` [m], at constant speed between `begin` and `end` [s]."""
 
@@ -116,7 +103,7 @@ class StraightMove:
 class Obstacle:
     """One obstacle: what it is, where, how it moves, and what the controller sees of it."""
 
-    shape: Shape
+    shape: ObstacleShape
     position: Vector3
     name: str | None = None
     rotation_deg: Vector3 = (0.0, 0.0, 0.0)
@@ -266,12 +253,13 @@ class Scenario:
                 )
             if item.motion is not None and any(item.velocity):
                 raise ScenarioError(f"{file}: obstacles[{index}]: give either velocity or motion, not both")
-            if item.points == "ball" and item.shape.type not in ("sphere", "points"):
+            if item.points == "ball" and not isinstance(item.shape, Sphere | PointSource):
                 raise ScenarioError(
-                    f"{file}: obstacles[{index}].points is 'ball'; a {item.shape.type} allows centre, surface"
+                    f"{file}: obstacles[{index}].points is 'ball'; a {item.shape.kind} allows centre, surface"
                 )
-            if item.shape.type in ("plane", "points") and item.free:
-                kind = "plane" if item.shape.type == "plane" else "point cloud"
+            cloud = isinstance(item.shape, PointSource)
+            if item.free and (cloud or (isinstance(item.shape, Shape) and not item.shape.bounded)):
+                kind = "point cloud" if cloud else item.shape.kind
                 raise ScenarioError(f"{file}: obstacles[{index}].free is true; a {kind} can only be fixed")
         return dataclasses.replace(scenario, folder=folder or Path.cwd())
 
@@ -314,7 +302,7 @@ class Scenario:
                 robot, urdf=moved(robot.urdf), package_dirs=tuple(moved(d) for d in robot.package_dirs)
             )
         obstacles = tuple(
-            o if o.shape.file is None
+            o if isinstance(o.shape, Shape)
             else dataclasses.replace(o, shape=dataclasses.replace(o.shape, file=moved(o.shape.file)))
             for o in self.obstacles
         )  # fmt: skip
@@ -332,6 +320,8 @@ def _shipped_folder() -> Path:
 
 def _build(kind: Any, value: Any) -> Any:
     """The value of a checked document as the annotated type: mappings to dataclasses, lists to tuples."""
+    if kind == ObstacleShape:
+        return shape_of(value)
     if isinstance(kind, types.UnionType):
         if value is None:
             return None
@@ -377,6 +367,8 @@ def _locked(value: Any) -> float | str | tuple[float, ...]:
 
 def _plain(value: Any) -> Any:
     """The reverse of _build, without what equals the default."""
+    if isinstance(value, ObstacleShape):
+        return document_of(value)
     if dataclasses.is_dataclass(value):
         plain: dict[str, Any] = {}
         for entry in dataclasses.fields(value):

@@ -13,6 +13,8 @@ import yaml
 
 from sidestep.body.schema import mismatch
 from sidestep.scenario.config import section_schema
+from sidestep.scenario.shape import shape_schema
+from sidestep.shapes import KINDS
 
 if TYPE_CHECKING:
     import jsonschema
@@ -42,12 +44,18 @@ class ScenarioError(ValueError):
     """A scenario file is malformed, or asks for something impossible."""
 
 
-@cache
 def schema_text() -> str:
-    """The published JSON schema of scenario files, with the section `controller` as the core states its settings."""
+    """The published JSON schema of scenario files, with the section `controller` as the core states its settings, and
+    shapes as their classes do."""
+    return _schema_text(tuple(KINDS))
+
+
+@cache
+def _schema_text(kinds: tuple[str, ...]) -> str:
     text = (resources.files("sidestep.scenario") / "schema.json").read_text(encoding="utf-8")
     schema = json.loads(text)
     schema["$defs"]["controller"] = section_schema()
+    schema["$defs"]["shape"] = shape_schema(schema["$defs"]["shape"])
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -8,29 +8,16 @@ from functools import cached_property
 import mujoco
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
-from sidestep._core import JointLimits, JointType
-from sidestep.distance.convex_parts import convex_parts
 from sidestep.distance.scene import Scene, SceneObject, check_scene
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_at, pose_vector
+from sidestep.simulation.arm_model import add_robot, leader
+from sidestep.simulation.contacts import SCENE_BIT
+from sidestep.simulation.object_model import add_object
 
 Array = npt.NDArray[np.float64]
 
-STOPS = JointLimits.rounding  # [rad | m] of a joint beyond its position limits
-
-# Contact masks: two geoms touch when one's type meets the other's affinity. Arm and scene meet; the arm does
-# not meet itself (neighbouring hulls overlap by construction); objects meet the floor, not each other (a
-# cluster of obstacles may overlap, as in the thesis's 6.2.3).
-ARM_BIT, SCENE_BIT = 1, 2
-COLLISION_GROUP, VISUAL_GROUP = 3, 2  # MuJoCo's own viewer shows groups 0 to 2 and hides 3
-ARM_COLOUR, OBSTACLE_COLOUR, FLOOR_COLOUR = (
-    (0.85, 0.86, 0.88, 1.0),
-    (0.80, 0.15, 0.13, 1.0),
-    (0.93, 0.93, 0.93, 1.0),
-)
-LEAST_MASS = 1e-9  # [kg] and [kg m^2]; MuJoCo refuses moving bodies at or below 1e-15
+FLOOR_COLOUR = (0.93, 0.93, 0.93, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +140,9 @@ def build_model(
         name="overview", pos=[1.7, -1.4, 1.3], xyaxes=[0.64, 0.77, 0.0, -0.32, 0.27, 0.91]
     )
     owners: dict[str, tuple[str, str]] = {}
-    _add_robot(spec, robot, owners, damping=joint_damping, friction=joint_friction, visuals=visuals)
+    add_robot(spec, robot, owners, damping=joint_damping, friction=joint_friction, visuals=visuals)
     for item in scene:
-        _add_object(spec, item, owners)
+        add_object(spec, item, owners)
     if floor_height is not None:
         spec.worldbody.add_geom(
             name="floor",
@@ -174,214 +161,6 @@ def build_model(
     return _locate(model, robot, scene, owners)
 
 
-def _add_robot(
-    spec: mujoco.MjSpec,
-    robot: Robot,
-    owners: dict[str, tuple[str, str]],
-    *,
-    damping: float,
-    friction: float,
-    visuals: bool,
-) -> None:
-    limits = robot.limits
-    frames = {frame.name: frame for frame in robot.frames}
-    base = spec.worldbody.add_body(name="robot_base")
-    bodies: list[mujoco.MjsBody] = []
-    for joint in robot.joints:
-        parent = bodies[joint.parent] if joint.parent >= 0 else base
-        pose = pose_vector(joint.placement)
-        body = parent.add_body(name=f"joint:{joint.name}", pos=pose[:3], quat=pose[3:])
-        bodies.append(body)
-        hinge = (
-            mujoco.mjtJoint.mjJNT_HINGE if joint.type == JointType.revolute else mujoco.mjtJoint.mjJNT_SLIDE
-        )
-        # Stops are a rounding error beyond the limits: what starts there is not thrown back.
-        low, high = limits.lower[joint.coordinate] - STOPS, limits.upper[joint.coordinate] + STOPS
-        ends = joint.multiplier * np.array([low, high])
-        limited = bool(np.all(np.isfinite(ends)))
-        body.add_joint(
-            name=joint.name,
-            type=hinge,
-            axis=joint.axis,
-            limited=mujoco.mjtLimited.mjLIMITED_TRUE if limited else mujoco.mjtLimited.mjLIMITED_FALSE,
-            range=sorted(ends + joint.offset) if limited else [0.0, 0.0],
-            damping=_joint_coefficient(damping),
-            frictionloss=friction,
-        )
-    for index, body in enumerate(bodies):
-        _set_inertia(body, robot, index)
-    for link in robot.links:
-        frame = frames[link.name]
-        body = bodies[frame.joint] if frame.joint >= 0 else base
-        _add_geoms(spec, body, robot, link.name, frame.placement, owners, visuals=visuals)
-    for coordinate, name in enumerate(robot.coordinate_names):
-        leader = robot.joints[_leader(robot, coordinate)]
-        effort = float(limits.effort[coordinate])
-        spec.add_actuator(
-            name=name,
-            target=leader.name,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            ctrlrange=[-effort, effort] if np.isfinite(effort) else [0.0, 0.0],
-            ctrllimited=bool(np.isfinite(effort)),
-        )
-        for follower in robot.joints:
-            if follower.coordinate == coordinate and follower.name != leader.name:
-                ratio = follower.multiplier / leader.multiplier
-                gear = spec.add_equality(
-                    type=mujoco.mjtEq.mjEQ_JOINT,
-                    objtype=mujoco.mjtObj.mjOBJ_JOINT,
-                    name1=follower.name,
-                    name2=leader.name,
-                )
-                gear.data[0], gear.data[1] = follower.offset - ratio * leader.offset, ratio
-
-
-def _leader(robot: Robot, coordinate: int) -> int:
-    """Index of the joint that carries a coordinate's motor: the one that mimics nothing."""
-    carried = [i for i, joint in enumerate(robot.joints) if joint.coordinate == coordinate]
-    plain = [i for i in carried if robot.joints[i].multiplier == 1.0 and robot.joints[i].offset == 0.0]
-    return (plain or carried)[0]
-
-
-def _joint_coefficient(value: float) -> float | list[float]:
-    """Joint damping as this MuJoCo wants it: one number before polynomial damping came, three since."""
-    joint = mujoco.MjSpec().worldbody.add_body().add_joint()
-    return value if np.ndim(joint.damping) == 0 else [value, *[0.0] * (np.size(joint.damping) - 1)]
-
-
-def _set_inertia(body: mujoco.MjsBody, robot: Robot, joint: int) -> None:
-    """Sums the inertias of the links that this joint carries, at their placements, into one."""
-    mass, moment, parts = 0.0, np.zeros(3), []
-    for frame in robot.frames:
-        inertial = robot.link(frame.name).inertial if frame.joint == joint else None
-        if inertial is None:
-            continue
-        R, p = frame.placement[:3, :3], frame.placement[:3, 3]
-        center = R @ inertial.com + p
-        mass += inertial.mass
-        moment += inertial.mass * center
-        parts.append((inertial.mass, center, R @ inertial.inertia @ R.T))
-    carrying = ", ".join(f.name for f in robot.frames if f.joint == joint)
-    if mass < LEAST_MASS:
-        raise ValueError(
-            f"joint {robot.joints[joint].name!r} of robot {robot.name!r} carries links ({carrying}) without "
-            f"mass; the simulation needs an <inertial> with positive mass on every moving link"
-        )
-    com = moment / mass
-    inertia = np.zeros((3, 3))
-    for part_mass, center, part_inertia in parts:
-        r = center - com
-        inertia += part_inertia + part_mass * (r @ r * np.eye(3) - np.outer(r, r))
-    principal, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
-    slack = 1e-6 * principal[2]
-    if principal[0] < LEAST_MASS or principal[2] > principal[0] + principal[1] + slack:
-        raise ValueError(
-            f"links {carrying} of robot {robot.name!r} have principal inertias "
-            f"{', '.join(f'{value:.3g}' for value in principal)} kg m^2; a rigid body needs all of them "
-            f"positive and each at most the sum of the other two"
-        )
-    if np.linalg.det(axes) < 0.0:
-        axes[:, 0] *= -1.0
-    pose = pose_vector(pose_at(com, axes))
-    body.explicitinertial = True
-    body.mass, body.ipos, body.iquat = mass, pose[:3], pose[3:]
-    body.inertia = np.minimum(principal, [np.inf, np.inf, principal[0] + principal[1]])
-
-
-def _add_geoms(
-    spec: mujoco.MjSpec,
-    body: mujoco.MjsBody,
-    robot: Robot,
-    link: str,
-    placement: Array,
-    owners: dict[str, tuple[str, str]],
-    *,
-    visuals: bool,
-) -> None:
-    for i, geometry in enumerate(robot.link(link).geometries):
-        for k, corners in enumerate(convex_parts(np.array(geometry.mesh().triangles, dtype=float))):
-            name = f"collision:{link}:{i}:{k}"
-            spec.add_mesh(name=name, uservert=corners.ravel())
-            _add_geom(body, name, placement, touches=True)
-            owners[name] = ("link", link)
-    for i, geometry in enumerate(robot.link(link).visuals if visuals else ()):
-        name = f"visual:{link}:{i}"
-        if _add_mesh(spec, name, geometry.mesh()):
-            _add_geom(body, name, placement, touches=False)
-
-
-def _add_geom(body: mujoco.MjsBody, name: str, placement: Array, *, touches: bool) -> None:
-    pose = pose_vector(placement)
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=name,
-        pos=pose[:3],
-        quat=pose[3:],
-        rgba=ARM_COLOUR,
-        contype=ARM_BIT if touches else 0,
-        conaffinity=0,
-        group=COLLISION_GROUP if touches else VISUAL_GROUP,
-        mass=0.0,
-    )
-
-
-def _add_mesh(spec: mujoco.MjSpec, name: str, mesh: trimesh.Trimesh) -> bool:
-    """Adds a mesh asset; False for a flat or empty one, which has no hull to collide."""
-    if len(mesh.faces) < 4 or np.linalg.matrix_rank(mesh.vertices - mesh.vertices[0], tol=1e-6) < 3:
-        return False
-    spec.add_mesh(
-        name=name,
-        uservert=np.asarray(mesh.vertices, dtype=float).ravel(),
-        userface=np.asarray(mesh.faces, dtype=int).ravel(),
-        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-    )
-    return True
-
-
-def _add_object(spec: mujoco.MjSpec, item: SceneObject, owners: dict[str, tuple[str, str]]) -> None:
-    pose = pose_vector(item.pose)
-    body = spec.worldbody.add_body(name=f"object:{item.name}", pos=pose[:3], quat=pose[3:])
-    if item.motion == "free":
-        body.add_freejoint()
-        body.gravcomp = 1.0
-    body.mocap = item.motion == "moving"
-    name = f"object:{item.name}"
-    mesh_name = ""
-    if item.mesh is not None:
-        mesh_name = name
-        if not _add_mesh(spec, name, item.mesh):
-            raise ValueError(f"object {item.name!r}: its mesh is flat or empty, MuJoCo needs a volume")
-    types = {
-        "sphere": "SPHERE",
-        "box": "BOX",
-        "cylinder": "CYLINDER",
-        "capsule": "CAPSULE",
-        "plane": "PLANE",
-        "mesh": "MESH",
-    }
-    size = np.zeros(3)
-    if item.kind == "plane":
-        size[:] = item.size[0]  # of the drawing alone
-    elif item.kind == "box":
-        size[:] = 0.5 * np.array(item.size)
-    elif item.kind in ("cylinder", "capsule"):
-        size[:2] = item.size[0], 0.5 * item.size[1]
-    elif item.kind == "sphere":
-        size[0] = item.size[0]
-    body.add_geom(
-        name=name,
-        type=getattr(mujoco.mjtGeom, f"mjGEOM_{types[item.kind]}"),
-        meshname=mesh_name,
-        size=size,
-        rgba=OBSTACLE_COLOUR,
-        contype=SCENE_BIT,
-        conaffinity=ARM_BIT,
-        mass=item.mass,
-    )
-    owners[name] = ("object", item.name)
-
-
 def _locate(
     model: mujoco.MjModel, robot: Robot, scene: tuple[SceneObject, ...], owners: dict[str, tuple[str, str]]
 ) -> SimulationModel:
@@ -395,7 +174,7 @@ def _locate(
         joint_velocities=np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
         coordinate=coordinate,
         offset=np.array([joint.offset for joint in robot.joints]),
-        leaders=np.array([_leader(robot, c) for c in range(robot.num_coordinates)], dtype=np.intp),
+        leaders=np.array([leader(robot, c) for c in range(robot.num_coordinates)], dtype=np.intp),
         actuators=np.array([model.actuator(name).id for name in robot.coordinate_names], dtype=np.intp),
         geom_owner={model.geom(name).id: owner for name, owner in owners.items()},
         object_bodies=tuple(int(model.body(f"object:{item.name}").id) for item in scene),

@@ -21,6 +21,7 @@ from sidestep.scenario.scenario import (
     StraightMove,
     Vector3,
 )
+from sidestep.shapes import Shape
 from sidestep.studio.archive import unpack
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
@@ -110,7 +111,7 @@ def save_scenario(scenario: Scenario, folder: Path, *, replace: bool = False) ->
     obstacles = []
     for item in scenario.obstacles:
         shape = item.shape
-        if shape.file is not None:
+        if not isinstance(shape, Shape):
             source = scenario.file(shape.file)
             if source not in copies:
                 name = f"{scenario.name}-{source.name.removeprefix(f'{scenario.name}-')}"

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates
-from sidestep.scenario.scenario import JointState, Obstacle, Shape
+from sidestep.scenario.scenario import JointState, Obstacle
+from sidestep.shapes import Sphere
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +56,7 @@ OPENING = "Table"
 
 def with_mouse_ball(scenario: Scenario, place: tuple[float, float, float] = MOUSE_BALL_PLACE) -> Scenario:
     """The scenario and one ball more, at a place [m]."""
-    ball = Obstacle(Shape("sphere", radius=MOUSE_BALL_RADIUS), place, name=MOUSE_BALL, points="ball")
+    ball = Obstacle(Sphere(MOUSE_BALL_RADIUS), place, name=MOUSE_BALL, points="ball")
     return dataclasses.replace(scenario, obstacles=(*scenario.obstacles, ball))
 
 

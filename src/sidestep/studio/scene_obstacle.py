@@ -17,7 +17,9 @@ from sidestep.robot.pose import from_roll_pitch_yaw, moved, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
 from sidestep.scenario.perception import View, cloud_balls, view_of
-from sidestep.scenario.scenario import Obstacle, Shape, Vector3
+from sidestep.scenario.scenario import Obstacle, Vector3
+from sidestep.scenario.shape import PointSource
+from sidestep.shapes import Box, Sphere
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +63,7 @@ class SceneObstacle:
     @cached_property
     def _cloud_balls(self) -> tuple[Array, float] | None:
         shape = self.obstacle.shape
-        if shape.type != "points" or shape.file is None:
+        if not isinstance(shape, PointSource):
             return None
         points, radius = cloud_balls(shape, (self.folder / shape.file).resolve())
         if len(points) > CLOUD_LIMIT:
@@ -79,7 +81,7 @@ class SceneObstacle:
             return tuple(
                 SceneObject(
                     f"{self.name}.{k}",
-                    "sphere",
+                    Sphere.kind,
                     size=(radius,),
                     pose=self.start @ pose_at(p),
                     motion="moving",
@@ -177,21 +179,17 @@ def thing_of(solid: str, things: Iterable[SceneObstacle]) -> str:
 
 def ball(name: str, position: Array, radius: float) -> SceneObstacle:
     """A ball at a position (3,) [m] in the world."""
-    return SceneObstacle(
-        name, Obstacle(Shape("sphere", radius=radius), _vector(position), points="ball"), Path.cwd()
-    )
+    return SceneObstacle(name, Obstacle(Sphere(radius), _vector(position), points="ball"), Path.cwd())
 
 
 def box(name: str, position: Array, size: Array) -> SceneObstacle:
     """A box with edge lengths (3,) [m] around a position (3,) [m]."""
-    return SceneObstacle(
-        name, Obstacle(Shape("box", size=_vector(size)), _vector(position), points="surface"), Path.cwd()
-    )
+    return SceneObstacle(name, Obstacle(Box(_vector(size)), _vector(position), points="surface"), Path.cwd())
 
 
 def cloud(name: str, position: Array, file: Path, radius: float) -> SceneObstacle:
     """The points of a file (see `load_point_cloud`) around a position, each a ball [m]."""
-    shape = Shape("points", file=str(file.resolve()), radius=radius)
+    shape = PointSource(file=str(file.resolve()), radius=radius)
     return SceneObstacle(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
 
 

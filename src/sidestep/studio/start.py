@@ -11,7 +11,8 @@ import numpy.typing as npt
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
-from sidestep.scenario.scenario import JointState, Obstacle, RobotConfig, Shape
+from sidestep.scenario.scenario import JointState, Obstacle, RobotConfig
+from sidestep.shapes import Sphere
 
 Array = npt.NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def scenario_of(choice: RobotConfig) -> Scenario:
         method="controller",
         start=_state(start),
         goal=_state(goal),
-        obstacles=(Obstacle(Shape("sphere", radius=BALL), position, name="ball", points="ball"),),
+        obstacles=(Obstacle(Sphere(BALL), position, name="ball", points="ball"),),
     )
 
 

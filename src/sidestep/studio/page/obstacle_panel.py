@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from sidestep.obstacles import load_point_cloud
 from sidestep.robot.pose import from_quaternion, pose_at
+from sidestep.shapes import Box
 from sidestep.studio import messages as m
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.loop_link import LoopLink
@@ -117,10 +118,10 @@ class ObstaclePanel:
         index, last = self._index(), self._loop.last
         if index is not None and last is not None:
             x, y, z = (float(value) for value in last.poses[index][:3, 3].round(3))
-            size = last.things[index].obstacle.shape.size
-            self._box.visible = size is not None
-            if size is not None:
-                sides = tuple(round(100.0 * side, 2) for side in size)
+            shape = last.things[index].obstacle.shape
+            self._box.visible = isinstance(shape, Box)
+            if isinstance(shape, Box):
+                sides = tuple(round(100.0 * side, 2) for side in shape.size)
                 if self._box_shown != (self._chosen.value, sides):
                     self._box_shown = self._chosen.value, sides
                     self._box.value = sides
@@ -160,7 +161,7 @@ class ObstaclePanel:
             return
         thing = last.things[index]
         x, y, z = (float(side) / 100.0 for side in self._box.value)
-        shape = dataclasses.replace(thing.obstacle.shape, size=(x, y, z))
+        shape = Box((x, y, z))
         self._box_shown = self._chosen.value, tuple(map(float, self._box.value))
         item = dataclasses.replace(thing.obstacle, shape=shape)
         self._loop.send(m.ReplaceObstacle(SceneObstacle(thing.name, item, thing.folder)))

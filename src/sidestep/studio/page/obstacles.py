@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.robot.pose import from_quaternion, pose_at, pose_vector
+from sidestep.shapes import Box, Sphere
 from sidestep.studio import messages as m
 from sidestep.studio.page import colours
 from sidestep.studio.scene_obstacle import SceneObstacle
@@ -86,9 +87,9 @@ class _View:
                 batched_positions=thing.cloud,
                 batched_colors=colours.batched(colours.rgb(colours.OBSTACLE)),
             )
-        elif solid.kind == "sphere":
-            self.handle = server.scene.add_icosphere(name, solid.size[0], color=colour)
-        elif solid.kind == "box":
+        elif isinstance(solid.shape, Sphere):
+            self.handle = server.scene.add_icosphere(name, solid.shape.radius, color=colour)
+        elif isinstance(solid.shape, Box):
             self.handle = server.scene.add_box(name, color=colour, dimensions=np.array(solid.size))
             server.scene.add_line_segments(  # faces that the light does not reach look alike
                 f"{name}/edges",

@@ -7,9 +7,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from sidestep._core import distance_to_triangles
-from sidestep.obstacles.ball_cover import check_count, check_excess, cover
-from sidestep.obstacles.flat_cover import flat_balls, on_large_faces
-from sidestep.obstacles.nearest_on_mesh import NearestOnMesh
+from sidestep.shapes.ball_cover import check_count, check_excess, cover
+from sidestep.shapes.flat_cover import flat_balls, on_large_faces
+from sidestep.shapes.nearest_on_mesh import NearestOnMesh
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from sidestep.obstacles.nearest_on_mesh import MAX_PAIRS, NearestOnMesh
 from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.nearest_on_mesh import MAX_PAIRS, NearestOnMesh
 
 MESHES = {
     "round": trimesh.creation.icosphere(subdivisions=3, radius=0.2),

@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sidestep.obstacles.ball_cover import MAX_CELLS
-from sidestep.obstacles.nearest_on_mesh import nearest_on_triangles
+from sidestep.shapes.ball_cover import MAX_CELLS
+from sidestep.shapes.nearest_on_mesh import nearest_on_triangles
 
 Array = NDArray[np.float64]
 Fits = Callable[[Array, float], NDArray[np.bool_]]

@@ -89,6 +89,11 @@ def check_count(count: float) -> None:
         )
 
 
+def cell_size(depth: float, excess: float) -> float:
+    """Edge of the largest square that a ball of this depth holds, less some rounding."""
+    return (1.0 - 1e-9) * float(np.sqrt(2.0 * (2.0 * depth * excess + excess**2)))
+
+
 def _fewest(
     centres: Array, radii: Array, corners: Array, middles: Array
 ) -> tuple[list[int], Array, NDArray[np.bool_]]:

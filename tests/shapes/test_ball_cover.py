@@ -20,8 +20,7 @@ from sidestep import SceneObject
 from sidestep._core import distance_to_triangles
 from sidestep.distance.solid import object_solid
 from sidestep.obstacles import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere, pose_at
-from sidestep.obstacles.ball_cover import EXCESS
-from sidestep.obstacles.solid_cover import box_balls
+from sidestep.shapes.ball_cover import EXCESS
 
 ROUNDING = 1e-9  # [m] poses are applied in double precision at the scale of ten metres
 SOLVER = 2e-6  # [m] to which Coal's iterations find distances of convex solids
@@ -341,7 +340,7 @@ def test_an_excess_that_asks_for_too_many_balls_is_refused_with_one_that_does_no
 def test_a_large_plate_is_covered_at_once_and_without_gaps() -> None:
     """A guard of 1 mm took seconds: a search for the fewest balls."""
     size, excess = (0.001, 1.0, 0.6), 0.002
-    centres, radii = box_balls(size, excess)
+    centres, radii = Box(size).cover(excess)
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (2000, 3)) * size
     sides = rng.integers(3, size=2000)

@@ -1,0 +1,9 @@
+from .catalogue import RobotEntry as RobotEntry
+from .catalogue import robots as robots
+from .link import Geometry as Geometry
+from .link import Inertial as Inertial
+from .link import Link as Link
+from .model import Robot as Robot
+from .planar import planar_arm as planar_arm
+from .srdf import read_srdf as read_srdf
+from .tip import tip_of as tip_of
