@@ -5,13 +5,14 @@ from sidestep.shapes.capsule import Capsule
 from sidestep.shapes.cylinder import Cylinder
 from sidestep.shapes.mesh import MeshShape, Triangles
 from sidestep.shapes.plane import Plane
-from sidestep.shapes.shape import KINDS, Fineness, Shape, is_shape, kind_of, metres, register
+from sidestep.shapes.shape import FINE, KINDS, Fineness, Shape, is_shape, kind_of, metres, register
 from sidestep.shapes.sphere import Sphere
 
 for kind in (Sphere, Box, Cylinder, Capsule, Plane, MeshShape):
     register(kind)
 
 __all__ = [
+    "FINE",
     "KINDS",
     "Box",
     "Capsule",
