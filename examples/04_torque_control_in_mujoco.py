@@ -20,7 +20,7 @@ seen = ss.Obstacles([pose[:3, 3]], radii=0.05)
 
 controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))  # the same motion every time
 controller.set_goal(goal)
-driver = ss.ControllerDriver(controller, seen)
+driver = ss.ControllerAdapter(controller, seen)
 run = ss.Simulation(arm.robot, scene).run(driver, start, goal, 8.0)
 
 found = ss.evaluate(run)

@@ -26,6 +26,7 @@ from .robot import Robot as Robot
 from .robot import robots as robots
 from .scenario import Scenario as Scenario
 from .scenario import run_scenario as run_scenario
+from .simulation import ControllerAdapter as ControllerAdapter
 from .simulation import ControllerDriver as ControllerDriver
 from .simulation import Simulation as Simulation
 from .simulation import evaluate as evaluate

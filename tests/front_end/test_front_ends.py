@@ -23,7 +23,7 @@ from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import run_scenario
 from sidestep.scenario.assembly import assemble
 from sidestep.shipped_arms import shipped_file
-from sidestep.simulation import ControllerDriver, Drive, KinematicRun, Simulation, SimulationRun
+from sidestep.simulation import ControllerAdapter, Drive, KinematicRun, Simulation, SimulationRun
 from sidestep.studio.export import scenario_now
 from sidestep.studio.mover import ControllerMover
 from sidestep.studio.session import Session
@@ -192,7 +192,7 @@ class Measured:
     torques: Array
 
 
-class Watched(ControllerDriver):
+class Watched(ControllerAdapter):
     """Notes what it is told."""
 
     def drive(self, time: float, *measured: Any) -> Drive:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sidestep.simulation import Simulation, SimulationRun
-from sidestep.thesis.driver import SystemDriver
+from sidestep.thesis.adapter import SystemAdapter
 
 PENDULUM = """
 <robot name="pendulum">
@@ -63,4 +63,4 @@ def simulate(
     simulation: Simulation, system, program, start, goal, duration, obstacles, **options
 ) -> SimulationRun:
     """A run driven by a system and a program."""
-    return simulation.run(SystemDriver(system, goal, obstacles, program), start, goal, duration, **options)
+    return simulation.run(SystemAdapter(system, goal, obstacles, program), start, goal, duration, **options)

@@ -8,7 +8,7 @@ from sidestep.robot.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem
-from sidestep.thesis.driver import SystemDriver
+from sidestep.thesis.adapter import SystemAdapter
 
 START = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8])
 TIP = "fr3_hand_tcp"
@@ -59,7 +59,7 @@ def test_an_arm_of_seven_joints_comes_to_a_pose_in_seconds(arm: Robot) -> None:
     system = GeometricSystem([], robot=arm, stiffness=4.0, damping=4.0)
     pose = target(arm)
     aim = PoseTarget(arm, TIP, pose)
-    driver = SystemDriver(system, solve_ik(arm, TIP, pose, START).q, Obstacles.none())
+    driver = SystemAdapter(system, solve_ik(arm, TIP, pose, START).q, Obstacles.none())
     arrival = Arrival(speed=np.inf, hold=0.0)
     run = run_kinematically(arm, driver, START, aim, 12.0, timestep=0.01, arrival=arrival)
     assert run.time_to_goal is not None

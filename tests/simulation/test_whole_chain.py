@@ -12,7 +12,7 @@ from sidestep.control import TorqueController
 from sidestep.simulation import run_kinematically
 from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
-from sidestep.thesis.driver import SystemDriver
+from sidestep.thesis.adapter import SystemAdapter
 
 START, GOAL = np.deg2rad([0, 45, 0, -66, 0, 66, 45]), np.deg2rad([90, 45, 0, -66, 0, 66, 45])
 
@@ -51,7 +51,7 @@ def test_torque_control_follows_the_kinematic_motion(fr3: tuple[Robot, Collision
         Simulation(robot, objects), system, TorqueController(robot), START, GOAL, 2.0, obstacles, arrival=None
     )
     kinematic = run_kinematically(
-        robot, SystemDriver(system, GOAL, obstacles), START, GOAL, 2.0, objects=objects, arrival=None
+        robot, SystemAdapter(system, GOAL, obstacles), START, GOAL, 2.0, objects=objects, arrival=None
     )
     assert len(simulated) == len(kinematic) == 2000
     # the torque weight's 1e-8 rad/s^2, integrated twice along a motion that obstacles make stiffer
@@ -70,11 +70,11 @@ def test_callable_obstacles_and_points_with_velocity_are_the_same_motion(
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
     point, velocity = np.array([[0.4, 0.53, 0.52]]), np.array([[0.0, 0.0, -0.1]])
     moving = run_kinematically(
-        robot, SystemDriver(system, GOAL, Obstacles(point, 0.0, velocity)), START, GOAL, 0.5
+        robot, SystemAdapter(system, GOAL, Obstacles(point, 0.0, velocity)), START, GOAL, 0.5
     )
     called = run_kinematically(
         robot,
-        SystemDriver(system, GOAL, lambda time: Obstacles(point + time * velocity, 0.0, velocity)),
+        SystemAdapter(system, GOAL, lambda time: Obstacles(point + time * velocity, 0.0, velocity)),
         START,
         GOAL,
         0.5,
@@ -86,7 +86,7 @@ def test_callable_obstacles_and_points_with_velocity_are_the_same_motion(
 def test_kinematic_run_stops_on_arrival(fr3: tuple[Robot, CollisionDensity]) -> None:
     robot, psi = fr3
     system = GeometricSystem([psi], stiffness=4.0, damping=4.0)
-    run = run_kinematically(robot, SystemDriver(system, GOAL, Obstacles.none()), START, GOAL, 20.0)
+    run = run_kinematically(robot, SystemAdapter(system, GOAL, Obstacles.none()), START, GOAL, 20.0)
     assert run.arrived
     assert run.time_to_goal is not None
     assert run.time[-1] - run.time_to_goal == pytest.approx(0.2, abs=1.5e-3)  # the rule's hold, one period
@@ -97,7 +97,9 @@ def test_goal_outside_the_limits(fr3: tuple[Robot, CollisionDensity]) -> None:
     robot, psi = fr3
     system = GeometricSystem([psi])
     with pytest.raises(ValueError, match="goal: joint 'fr3_joint4' is 0"):
-        run_kinematically(robot, SystemDriver(system, np.zeros(7), Obstacles.none()), START, np.zeros(7), 1.0)
+        run_kinematically(
+            robot, SystemAdapter(system, np.zeros(7), Obstacles.none()), START, np.zeros(7), 1.0
+        )
 
 
 def test_kinematic_objects_follow_their_scripts(fr3: tuple[Robot, CollisionDensity]) -> None:
@@ -108,7 +110,7 @@ def test_kinematic_objects_follow_their_scripts(fr3: tuple[Robot, CollisionDensi
     )
     run = run_kinematically(
         robot,
-        SystemDriver(GeometricSystem([psi]), GOAL, Obstacles.none()),
+        SystemAdapter(GeometricSystem([psi]), GOAL, Obstacles.none()),
         START,
         GOAL,
         0.5,

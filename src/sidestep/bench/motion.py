@@ -23,7 +23,7 @@ from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
 from sidestep.robot.tolerance import tolerances
 from sidestep.robot.turns import ways_to
-from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation
+from sidestep.simulation import Adapter, Arrival, ControllerAdapter, Simulation, StepRecord
 from sidestep.simulation.pose_target import PoseTarget
 
 Array = npt.NDArray[np.float64]
@@ -139,7 +139,7 @@ class ControllerMover:
             pose = PoseTarget(self.robot, tip, self.robot.pose(problem.goal, tip))
         controller.set_goal(problem.goal if pose is None else pose.goal)
         if settings.torque:
-            driver = ControllerDriver(controller, _Changing(problem))
+            driver = ControllerAdapter(controller, _Changing(problem))
             motion = under_torque(self.robot, driver, problem, settings, pose)
             return self._told(motion, _planned(controller), controller, pose)
         columns = Columns(self.robot, problem, settings)
@@ -259,11 +259,11 @@ class Columns:
 class _Timed:
     """A driver with a clock around it."""
 
-    def __init__(self, driver: Driver) -> None:
+    def __init__(self, driver: Adapter) -> None:
         self._driver = driver
         self.seconds: list[float] = []
 
-    def drive(self, time_: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> Drive:
+    def drive(self, time_: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> StepRecord:
         """The driver's own."""
         begin = time.perf_counter()
         result = self._driver.drive(time_, q, v, mass_matrix, bias)
@@ -273,7 +273,7 @@ class _Timed:
 
 def under_torque(
     robot: Robot,
-    driver: Driver,
+    driver: Adapter,
     problem: Problem,
     settings: MotionSettings,
     pose: PoseTarget | None = None,

@@ -23,7 +23,7 @@ from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.controller_settings import controller_settings_of
-from sidestep.scenario.custom_method import RunDriver, custom_method
+from sidestep.scenario.custom_method import RunAdapter, custom_method
 from sidestep.scenario.perception import View, cloud_balls, seen_at, view_of
 from sidestep.scenario.plausibility import warn_of
 from sidestep.scenario.scenario import (
@@ -38,7 +38,7 @@ from sidestep.scenario.shape import MeshSource
 from sidestep.scenario.torque_program import torque_qp_of
 from sidestep.scenario.validation import ScenarioError
 from sidestep.shapes import Shape, Sphere
-from sidestep.simulation import ControllerDriver
+from sidestep.simulation import ControllerAdapter
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem
 
@@ -67,7 +67,7 @@ class Assembly:
     robot: Robot
     body: Body
     mover: Controller | GeometricSystem
-    driver: RunDriver
+    driver: RunAdapter
     objects: tuple[SceneObject, ...]
     start: Array
     start_velocity: Array
@@ -120,17 +120,17 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     if pose is None or written:
         posture = _at("goal", scenario, partial(goal_posture, scenario, robot, start))
     mover: Controller | GeometricSystem
-    driver: RunDriver
+    driver: RunAdapter
     if written:
         method = _at("method", scenario, custom_method)
         system = partial(method.system_of, scenario.embedding, scenario.system, robot, body)
         mover, integrator = _at("system", scenario, system), scenario.simulation.integrator
-        driver = method.SystemDriver(mover, posture.q, seen, program, integrator=integrator)
+        driver = method.SystemAdapter(mover, posture.q, seen, program, integrator=integrator)
     else:
         arm = _at("body", scenario, partial(Arm.from_robot, robot, body, progress=_of_pairs(progress)))
         mover = _at("method", scenario, partial(Controller, arm, settings))
         mover.set_goal(posture.q if pose is None else pose.goal)
-        driver = ControllerDriver(mover, seen)
+        driver = ControllerAdapter(mover, seen)
     return Assembly(
         robot=robot,
         body=body,

@@ -9,10 +9,10 @@ from sidestep.body import Body
 from sidestep.plugins import plugins
 from sidestep.robot import Robot
 from sidestep.scenario.scenario import EmbeddingConfig, SystemConfig
-from sidestep.simulation.driver import Driver, KinematicDriver
+from sidestep.simulation.adapter import Adapter, KinematicAdapter
 
 
-class RunDriver(Driver, KinematicDriver, Protocol):
+class RunAdapter(Adapter, KinematicAdapter, Protocol):
     """Drives the arm of a run, with physics or without."""
 
 
@@ -24,9 +24,9 @@ class CustomMethod(Protocol):
     ) -> GeometricSystem:
         """The system that a file writes out; raises ValueError where it does not fit the robot."""
 
-    def SystemDriver(  # noqa: N802  (a class)
+    def SystemAdapter(  # noqa: N802  (a class)
         self, system: GeometricSystem, goal: Any, obstacles: Any, torque_qp: Any, *, integrator: Any
-    ) -> RunDriver:
+    ) -> RunAdapter:
         """What drives the arm by it, with a torque program."""
 
 

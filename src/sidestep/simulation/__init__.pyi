@@ -1,7 +1,11 @@
-from .driver import ControllerDriver as ControllerDriver
-from .driver import Drive as Drive
-from .driver import Driver as Driver
-from .driver import KinematicDriver as KinematicDriver
+from .adapter import Adapter as Adapter
+from .adapter import ControllerAdapter as ControllerAdapter
+from .adapter import ControllerDriver as ControllerDriver
+from .adapter import Drive as Drive
+from .adapter import Driver as Driver
+from .adapter import KinematicAdapter as KinematicAdapter
+from .adapter import KinematicDriver as KinematicDriver
+from .adapter import StepRecord as StepRecord
 from .evaluation import Evaluation as Evaluation
 from .evaluation import LimitViolations as LimitViolations
 from .evaluation import evaluate as evaluate

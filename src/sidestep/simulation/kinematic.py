@@ -12,7 +12,7 @@ from sidestep._core import real_array
 from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
 from sidestep.robot.pose import pose_vector
-from sidestep.simulation.driver import KinematicDriver
+from sidestep.simulation.adapter import KinematicAdapter
 from sidestep.simulation.pose_target import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, KinematicRun
 
@@ -24,7 +24,7 @@ _COLUMNS = ("q", "v", "wanted", "achieved", "switch", "values", "system_status")
 
 def run_kinematically(
     robot: Robot,
-    driver: KinematicDriver,
+    driver: KinematicAdapter,
     start: Array,
     goal: Array | PoseTarget,
     duration: float,
@@ -38,7 +38,7 @@ def run_kinematically(
     """Integrates accelerations themselves: no masses, torques or contacts.
 
     Args:
-        driver: what moves the arm: `ControllerDriver`, or the thesis's `SystemDriver`.
+        driver: what moves the arm: `ControllerAdapter`, or the thesis's `SystemAdapter`.
         start, goal, duration, start_velocity, arrival: as in `Simulation.run`. Free objects stay where they are.
         on_step: called with time [s] and q every now and then.
 

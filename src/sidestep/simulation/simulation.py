@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sidestep._core import real_array
 from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
-from sidestep.simulation.driver import Driver
+from sidestep.simulation.adapter import Adapter
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_target import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
@@ -68,7 +68,7 @@ class Simulation:
 
     def run(
         self,
-        driver: Driver,
+        driver: Adapter,
         start: Array,
         goal: Array | PoseTarget,
         duration: float,
@@ -80,7 +80,7 @@ class Simulation:
         """Runs the loop: state, torque, physics, record.
 
         Args:
-            driver: what turns states into torque: `ControllerDriver`, or the thesis's `SystemDriver`. It never sees
+            driver: what turns states into torque: `ControllerAdapter`, or the thesis's `SystemAdapter`. It never sees
                 `objects`.
             start, goal: (nv,) configurations inside the limits; the goal, perhaps a pose, is what arrival is
                 measured by: the driver has its own.

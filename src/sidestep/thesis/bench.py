@@ -11,7 +11,7 @@ from sidestep.bench.motion import CHUNK, Columns, Motion, MotionSettings, under_
 from sidestep.bench.problem import Problem
 from sidestep.body import Body
 from sidestep.robot import Robot
-from sidestep.thesis.driver import SystemDriver
+from sidestep.thesis.adapter import SystemAdapter
 from sidestep.thesis.system import ThesisNumbers, thesis_system
 
 
@@ -30,7 +30,7 @@ class SystemMover:
             program = TorqueController(self.robot, period=settings.period)
             return under_torque(
                 self.robot,
-                SystemDriver(self.system, problem.goal, problem.obstacles_at, program),
+                SystemAdapter(self.system, problem.goal, problem.obstacles_at, program),
                 problem,
                 settings,
             )

@@ -20,7 +20,7 @@ from sidestep._core import (
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario.scenario import EmbeddingConfig, SwitchConfig, SystemConfig
-from sidestep.thesis.driver import SystemDriver as SystemDriver
+from sidestep.thesis.adapter import SystemAdapter as SystemAdapter
 
 Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 

@@ -1,4 +1,4 @@
-"""What drives an arm in a simulation: a `Controller`; or, of the thesis, a geometric system with a torque QP."""
+"""What stands between a simulation and what moves the arm: a `Controller`, or a geometric system with a torque QP."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """What one step of a driver gives.
+class StepRecord:
+    """What one step of an adapter gives.
 
     Attributes:
-        torque: (nv,) [Nm | N]. acceleration: (nv,) that it causes in the driver's model [rad/s^2 | m/s^2].
+        torque: (nv,) [Nm | N]. acceleration: (nv,) that it causes in the adapter's model [rad/s^2 | m/s^2].
         wanted: (nv,) before any limit. switch, values: of the geometric system, empty where there is none.
         system_status, controller_status: names.
     """
@@ -36,24 +36,26 @@ class Drive:
     values: Array = field(default_factory=lambda: NOTHING)
 
 
-Moment: TypeAlias = tuple[Array, Array, Array, Drive]  # q, v, achieved acceleration (nv,) each, and the step
+StateRecord: TypeAlias = tuple[
+    Array, Array, Array, StepRecord
+]  # q, v, achieved acceleration (nv,) each, and the step
 
 
-class Driver(Protocol):
+class Adapter(Protocol):
     """Turns a state into a torque, once a period."""
 
-    def drive(self, time: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> Drive:
+    def drive(self, time: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> StepRecord:
         """One step at a time [s], q and v (nv,), with mass matrix (nv, nv) and bias (nv,) there."""
 
 
-class KinematicDriver(Protocol):
+class KinematicAdapter(Protocol):
     """Moves an arm without physics."""
 
-    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[Moment]:
+    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[StateRecord]:
         """So many steps of a period [s] from q and v (nv,)."""
 
 
-class ControllerDriver:
+class ControllerAdapter:
     """A `Controller`, told what it sees.
 
     Args:
@@ -75,7 +77,7 @@ class ControllerDriver:
         v: Array,
         mass_matrix: Array | None = None,
         bias: Array | None = None,
-    ) -> Drive:
+    ) -> StepRecord:
         """One step of the controller; without masses by its own dynamics."""
         seen = None if self._see is None else self._see(time)
         if seen is not None:
@@ -84,7 +86,7 @@ class ControllerDriver:
             command = self.controller.step(q, v, mass_matrix, bias)
         else:
             command = self.controller.step(q, v)
-        return Drive(
+        return StepRecord(
             torque=command.torque,
             acceleration=command.acceleration,
             wanted=command.wanted,
@@ -93,10 +95,17 @@ class ControllerDriver:
             values=self.controller.values,
         )
 
-    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[Moment]:
-        """Its accelerations by semi-implicit Euler, see `KinematicDriver`."""
+    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[StateRecord]:
+        """Its accelerations by semi-implicit Euler, see `KinematicAdapter`."""
         for k in range(steps):
             step = self.drive(k * period, q, v)
             yield q, v, step.acceleration, step
             v = v + period * step.acceleration
             q = q + period * v
+
+
+# Their names in 0.2, when nothing was called a driver but what stands between a controller and a simulation.
+Drive: TypeAlias = StepRecord
+Driver: TypeAlias = Adapter
+KinematicDriver: TypeAlias = KinematicAdapter
+ControllerDriver: TypeAlias = ControllerAdapter
