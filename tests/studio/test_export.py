@@ -68,13 +68,13 @@ def tuned(name: str) -> dict[str, Any]:
 def recorded(session: Session, steps: int) -> list[tuple[Any, ...]]:
     """Of each step q, v, mass matrix and bias that are measured, obstacles that are seen, and the torque."""
     found: list[tuple[Any, ...]] = []
-    step = session._mover.step
+    step = session._adapter.step
 
     def spy(*told: Any) -> Any:
         found.append((*(np.copy(array) for array in told[:4]), told[4], step(*told)))
         return found[-1][-1]
 
-    session._mover.step = spy  # type: ignore[method-assign]
+    session._adapter.step = spy  # type: ignore[method-assign]
     for _ in range(steps):
         session.step()
     return found
@@ -236,7 +236,7 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
     expected = parts.mover.acceleration(
         parts.start, parts.start_velocity, parts.goal, parts.seen
     ).acceleration
-    np.testing.assert_array_equal(session._mover._step.acceleration, expected)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(session._adapter._step.acceleration, expected)  # type: ignore[union-attr]
     variables: dict[str, Any] = {}
     exec(python_snippet(session.snapshot()), variables)
     again = variables["system"].acceleration(parts.start, parts.start_velocity, parts.goal, parts.seen)

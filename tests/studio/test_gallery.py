@@ -30,7 +30,7 @@ from sidestep.studio.robot_file import scenario_of_upload
 from sidestep.studio.scene_obstacle import ball, box, things_of
 from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of, starting_scenario
-from sidestep.studio.systems import build_mover, draft_arm, make_body
+from sidestep.studio.systems import build_adapter, draft_arm, make_body
 from sidestep.studio.three_sliders import SLIDERS
 
 PLANAR = Path(__file__).parents[2] / "examples" / "planar3.urdf"
@@ -110,7 +110,7 @@ def test_a_slider_sets_what_it_shows_within_the_ranges(slider: object) -> None:
         numbers = slider.numbers(value, method)
         assert slider.of(numbers) == pytest.approx(value, rel=1e-12)
         assert method.in_range(numbers)
-        build_mover(method, robot, body, method.defaults | numbers, scenario)  # the controller takes them
+        build_adapter(method, robot, body, method.defaults | numbers, scenario)  # the controller takes them
     assert slider.numbers(slider.usual, method).items() <= method.defaults.items()
     assert not slider.applies_to(METHODS["thesis"].defaults)
 

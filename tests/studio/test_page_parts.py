@@ -17,9 +17,9 @@ import pytest
 from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.robot.pose import pose_at
 from sidestep.studio import messages as m
+from sidestep.studio.adapter import ControllerAdapter
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor, solid_poses
 from sidestep.studio.methods import METHODS
-from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page import colours, obstacle_panel
 from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
@@ -46,7 +46,7 @@ from sidestep.studio.page.view import begins_anew, live_row
 from sidestep.studio.page.words import begun
 from sidestep.studio.scene_obstacle import ball, cloud, thing_of
 from sidestep.studio.session import Session
-from sidestep.studio.systems import build_mover
+from sidestep.studio.systems import build_adapter
 
 MakeSession = Callable[..., Session]
 
@@ -56,7 +56,7 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
     snapshot, robot = session.snapshot(), session.robot
     method, body = METHODS["unswitched"], Body.fit(robot, components=1)
     numbers = method.defaults
-    system = build_mover(method, robot, body, numbers, scenario).system
+    system = build_adapter(method, robot, body, numbers, scenario).system
     points, radii = seen(snapshot, bare=True)
     np.testing.assert_array_equal(points, session._obstacles().points)
     np.testing.assert_array_equal(radii, session._obstacles().radii)
@@ -94,7 +94,7 @@ def test_the_surface_is_of_the_system_that_the_loop_runs(
     for velocity in (0.0, 2.0):  # [m/s] with which it could be at the arm in a second
         session.handle(m.ThrowObstacle("ball", np.array([0.0, velocity, 0.0])))
         now = session.snapshot()
-        system = build_mover(
+        system = build_adapter(
             method, session.robot, body, now.numbers["reactive"], scenario, synchronous=True
         ).system
         request = Request(
@@ -110,8 +110,8 @@ def test_the_surface_is_of_the_system_that_the_loop_runs(
         )
         height = heights_over(request, system)[cell[0], cell[1]]
         obstacles = session._obstacles()
-        assert isinstance(session._mover, ControllerMover)
-        controller = session._mover._said  # at rest where it is, to the goal
+        assert isinstance(session._adapter, ControllerAdapter)
+        controller = session._adapter._said  # at rest where it is, to the goal
         assert controller is not None
         psi = controller.system.acceleration(q, rest, q, obstacles, controller.activations).values
         assert height == pytest.approx(np.linalg.norm(psi), rel=1e-12)
@@ -441,7 +441,7 @@ def test_the_slice_of_an_arm_of_many_joints_is_taken_where_the_others_are(
         METHODS["unswitched"],
         METHODS["unswitched"].defaults,
     )
-    system = build_mover(method, robot, body, numbers, scenario).system
+    system = build_adapter(method, robot, body, numbers, scenario).system
     points, radii = np.array([[0.8, 0.3, 0.0]]), np.zeros(1)
 
     def request(q: np.ndarray, joints: tuple[int, int] = (1, 2)) -> Request:

@@ -13,7 +13,7 @@ from sidestep._core import Activity, Limit, SafetyStatus
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import ends_of
 from sidestep.studio.goals_in_turn import REST
-from sidestep.studio.reason import AGAIN, EVENTS, LASTING, Events, Moment, limit_in_words, path_from
+from sidestep.studio.reason import AGAIN, EVENTS, LASTING, EventRecord, Events, limit_in_words, path_from
 from sidestep.studio.session import Session
 
 MakeSession = Callable[..., Session]
@@ -97,7 +97,7 @@ def test_of_a_path_what_is_left_is_told() -> None:
 
 
 def test_events_are_changes_and_not_told_twice_in_a_second() -> None:
-    events, still = Events(), Moment(Activity.moving, False, 1, "", "")
+    events, still = Events(), EventRecord(Activity.moving, False, 1, "", "")
     events.take(0.0, still)
     events.take(0.1, replace(still, searches=2, stepping_aside=True, obstacle="ball", link="hand"))
     assert [word for _, word in events.told] == ["planned anew", "stepped aside from ball"]

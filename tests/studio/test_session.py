@@ -17,9 +17,9 @@ from sidestep.robot.pose import pose_at
 from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
+from sidestep.studio.adapter import ControllerAdapter
 from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.export import save_scenario, scenario_now
-from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page.arm import link_meshes, short_names
 from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.scene_obstacle import ball, box
@@ -244,9 +244,9 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
     session.handle(m.SetMethod("unswitched"))
     assert len(run(session, 0.1).values) == 1  # one density
     session.handle(m.SetNumbers("unswitched", {"stiffness": 4.0}))
-    assert session._mover.system.stiffness[0, 0] == 4.0
+    assert session._adapter.system.stiffness[0, 0] == 4.0
     session.handle(m.SetMethod("controller"))
-    assert session._mover.system.stiffness[0, 0] == session.snapshot().numbers["controller"]["stiffness"]
+    assert session._adapter.system.stiffness[0, 0] == session.snapshot().numbers["controller"]["stiffness"]
     assert session.snapshot().numbers["unswitched"]["stiffness"] == 4.0
     with pytest.raises(ValueError, match=r"controller: activation is 9.0, allowed: \[0.01, 1\]"):
         session.handle(m.SetNumbers("controller", {"activation": 9.0}))
@@ -319,16 +319,16 @@ def test_the_controller_is_told_of_what_moves_otherwise_than_it_was_told(
 ) -> None:
     session = make_session(scenario)
     told: list[object] = []
-    mover = session._mover
-    assert isinstance(mover, ControllerMover)
+    adapter = session._adapter
+    assert isinstance(adapter, ControllerAdapter)
 
     def counted(seconds: float) -> int:
         before = len(told)
         for _ in range(round(seconds / session.period)):
-            known = mover._told
+            known = adapter._told
             session.step()
-            if mover._told is not known:
-                told.append(mover._told)
+            if adapter._told is not known:
+                told.append(adapter._told)
         return len(told) - before
 
     assert counted(0.2) == 1

@@ -249,7 +249,7 @@ def test_a_loop_that_fails_holds_the_arm_and_says_why(
     make_session: Callable[..., Session], scenario: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = make_session(scenario, method="unswitched")
-    failing = session._mover.step
+    failing = session._adapter.step
     calls = 0
 
     def step(*arguments: object) -> object:
@@ -259,7 +259,7 @@ def test_a_loop_that_fails_holds_the_arm_and_says_why(
             raise np.linalg.LinAlgError("singular")
         return failing(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(session._mover, "step", step)
+    monkeypatch.setattr(session._adapter, "step", step)
     sent = [message for _, message in paced(session, monkeypatch, 0.5)]
     (failure,) = [message for message in sent if isinstance(message, m.Failed)]
     assert failure.message == "the step at 0.004 s failed, the loop is paused: LinAlgError: singular"

@@ -11,8 +11,8 @@ import numpy as np
 from sidestep.distance.clearance import Clearance
 from sidestep.robot import Robot
 from sidestep.studio import messages as m
+from sidestep.studio.adapter import NEAR_GOAL
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor
-from sidestep.studio.mover import NEAR_GOAL
 from sidestep.studio.scene_obstacle import SceneObstacle, things_of
 from sidestep.studio.session_process import Beginning, SessionProcess
 

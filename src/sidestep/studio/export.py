@@ -22,10 +22,10 @@ from sidestep.scenario.scenario import (
     Vector3,
 )
 from sidestep.shapes import Shape
+from sidestep.studio.adapter import STILL
 from sidestep.studio.archive import unpack
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
-from sidestep.studio.mover import STILL
 from sidestep.studio.scene_obstacle import written_pose
 from sidestep.studio.systems import as_file
 

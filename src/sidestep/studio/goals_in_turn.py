@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.studio.mover import NEAR_GOAL
+from sidestep.studio.adapter import NEAR_GOAL
 
 Array = npt.NDArray[np.float64]
 

@@ -193,7 +193,7 @@ class Snapshot:
         method: its name; numbers: its parameters by method and name.
         draft: the body is coarse; refining: how far a finer one is.
         visited: the configurations that are visited in turn; none where the arm stays with its goal.
-        words, status, activity, nearest, values, metric, activations, reason: see `Account`; status is empty before
+        words, status, activity, nearest, values, metric, activations, reason: see `StepRecord`; status is empty before
             the first step.
         events: what happened last, oldest first: simulated time [s] and words.
         torque_share, speed_share: largest of a joint over its limit.

@@ -10,7 +10,7 @@ from sidestep.body import Body
 from sidestep.plugins import plugins
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.studio.mover import Mover
+from sidestep.studio.adapter import Adapter
 from sidestep.studio.parameters import Method, Numbers
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class OtherMethods(Protocol):
     def numbers_of_custom(self, scenario: Scenario) -> tuple[str, Numbers]:
         """The method that a scenario of method custom is written for, and its numbers."""
 
-    def mover_of(self, written: Scenario, robot: Robot, body: Body, tip: str) -> Mover:
+    def adapter_of(self, written: Scenario, robot: Robot, body: Body, tip: str) -> Adapter:
         """What moves the arm, of a scenario of method custom; raises ValueError that names the number at fault."""
 
     def custom_code(self, snapshot: Snapshot, written: Scenario) -> list[str]:

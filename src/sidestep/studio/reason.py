@@ -109,7 +109,7 @@ def binding(controller: Controller, obstacles: Obstacles) -> tuple[str, str, int
 
 
 @dataclass(frozen=True)
-class Moment:
+class EventRecord:
     """What events are changes of.
 
     Attributes:
@@ -140,7 +140,7 @@ class Events:
 
     def __init__(self) -> None:
         self._told: deque[tuple[float, str]] = deque(maxlen=EVENTS)
-        self._last: Moment | None = None
+        self._last: EventRecord | None = None
         self._lasting: dict[
             str, tuple[str, float]
         ] = {}  # what is the case, and since when [s]; inf: it was told
@@ -155,7 +155,7 @@ class Events:
         if not any(words == known and time - then < AGAIN for then, known in self._told):
             self._told.append((time, words))
 
-    def take(self, time: float, now: Moment) -> None:
+    def take(self, time: float, now: EventRecord) -> None:
         """Tells what has changed since the moment before."""
         before = self._last
         self._last = now

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sidestep._core import Obstacles
-from sidestep.studio.mover import STILL
+from sidestep.studio.adapter import STILL
 from sidestep.studio.scene_obstacle import SceneObstacle
 from sidestep.studio.simulated_scene import MovableObstacle
 

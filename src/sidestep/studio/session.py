@@ -20,16 +20,16 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
+from sidestep.studio.adapter import Adapter, ControllerAdapter, StepRecord
 from sidestep.studio.goals_in_turn import GoalsInTurn
 from sidestep.studio.methods import METHODS, check_numbers, method_named
-from sidestep.studio.mover import Account, ControllerMover, Mover
 from sidestep.studio.parameters import Method, Numbers
 from sidestep.studio.prepared_bodies import USUAL, Draft, Prepare, PreparedBodies
 from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.seen_things import SeenThings
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
-from sidestep.studio.systems import build_mover, numbers_of, recipe_of
+from sidestep.studio.systems import build_adapter, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 
 Array = npt.NDArray[np.float64]
@@ -69,7 +69,7 @@ class Session:
     running: bool
     edition: int
     _prepared: PreparedBodies
-    _mover: Mover
+    _adapter: Adapter
     _loaded_goal: tuple[Array | None, Array]
     _goal: tuple[
         Array | None, Array
@@ -109,7 +109,7 @@ class Session:
                 self._turns.goals = ()
                 self._set_goal(None, self.robot.check_configuration(position, "goal"))
             case m.SetPoseGoal(pose, thorough):
-                last = None if self._goal[0] is None else self._mover.posture
+                last = None if self._goal[0] is None else self._adapter.posture
                 near = self.stage.state()[0] if last is None else last.q
                 self._turns.goals = ()
                 self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
@@ -162,7 +162,7 @@ class Session:
             case m.Seen() | m.Drawn():
                 return
         if not self.running:
-            self._mover.look(*self.stage.state(), self._obstacles())
+            self._adapter.look(*self.stage.state(), self._obstacles())
             self._contacts = self.stage.contacts()
 
     def step(self) -> None:
@@ -173,7 +173,7 @@ class Session:
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
-        self._torque = self._mover.step(q, v, *stage.dynamics(), self._obstacles())
+        self._torque = self._adapter.step(q, v, *stage.dynamics(), self._obstacles())
         finite = stage.end(self._torque)
         self._times.append(clock.perf_counter() - begin)
         if not finite:
@@ -190,15 +190,15 @@ class Session:
         else:
             self._contacts = ()
         if self._recording and self._count % RECORD_EVERY == 0:
-            self._rows.append(m.Row(self.time, q, self._seen.things, self._poses(), self._mover.metric))
+            self._rows.append(m.Row(self.time, q, self._seen.things, self._poses(), self._adapter.metric))
 
     def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
         q, v = self.stage.state()
         limits = self.robot.limits
         rows, self._rows = tuple(self._rows), []
-        account = self._mover.account() or Account("at the start", metric=np.eye(len(q)))
-        words = re.sub(r"\blink (?=\S*link)", "", account.words)  # such names say it themselves
+        record = self._adapter.record() or StepRecord("at the start", metric=np.eye(len(q)))
+        words = re.sub(r"\blink (?=\S*link)", "", record.words)  # such names say it themselves
         pose, near = self._goal
         return m.Snapshot(
             scenario=self.scenario,
@@ -209,7 +209,7 @@ class Session:
             v=v.copy(),
             goal=near if pose is None else None,
             goal_pose=pose,
-            posture=self._mover.posture,
+            posture=self._adapter.posture,
             goal_written=self._goal_written,
             draft=self._prepared.is_draft,
             refining=self._prepared.refining,
@@ -221,7 +221,7 @@ class Session:
             courses=tuple(actor.course for actor in self.stage.actors),
             method=self._method.name,
             numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
-            **vars(account) | {"words": words},
+            **vars(record) | {"words": words},
             events=self._events.told,
             torque_share=float((np.abs(self._torque) / limits.effort).max()),
             speed_share=float((np.abs(v) / limits.velocity).max()),
@@ -263,9 +263,9 @@ class Session:
         visited = tuple(robot.check_configuration(q, "goals") for q in goals)
         stage = SimulatedScene(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = self._numbers_for(scenario, given)
-        mover = self._mover_of(method, numbers[method.name], scenario, robot, prepared)
-        mover.set_goal(pose, near, thorough=True)
-        self._mover, self._goal, self._goal_written = mover, (pose, near), True
+        adapter = self._adapter_of(method, numbers[method.name], scenario, robot, prepared)
+        adapter.set_goal(pose, near, thorough=True)
+        self._adapter, self._goal, self._goal_written = adapter, (pose, near), True
         self._turns.goals, self._loaded_goal = visited, (pose, near)
         if self.edition and robot is not self.robot:
             self.stop()
@@ -309,7 +309,7 @@ class Session:
         """Events of the last step, a finer body, and the next goal where the arm has been at this one for a while."""
         if self._prepared.is_draft:
             self._take_finer()
-        moment = self._mover.moment()
+        moment = self._adapter.event_record()
         if moment is not None:
             self._events.take(self.time, moment)
         following = self._turns.due(self.time, q, self._goal[1])
@@ -317,7 +317,7 @@ class Session:
             self._set_goal(None, following)
 
     def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
-        self._mover.set_goal(pose, q, thorough=thorough)
+        self._adapter.set_goal(pose, q, thorough=thorough)
         self._goal, self._goal_written = (pose, q), False
         self._events.tell(self.time, "new goal")
 
@@ -327,25 +327,25 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
-        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._prepared)
-        (pose, near), found = self._goal, self._mover.posture
+        adapter = self._adapter_of(method, numbers, self.scenario, self.robot, self._prepared)
+        (pose, near), found = self._goal, self._adapter.posture
         if pose is not None and found is not None and found.found:
             near = found.q
-        mover.set_goal(pose, near, thorough=True)
-        self._mover, self._method, self._numbers[method.name] = mover, method, dict(numbers)
+        adapter.set_goal(pose, near, thorough=True)
+        self._adapter, self._method, self._numbers[method.name] = adapter, method, dict(numbers)
         self._goal = pose, near
         self._look()
 
-    def _mover_of(
+    def _adapter_of(
         self,
         method: Method,
         numbers: Numbers,
         scenario: Scenario,
         robot: Robot,
         prepared: PreparedBodies,
-    ) -> Mover:
+    ) -> Adapter:
         body, arm = prepared.get(recipe_of(method, numbers, scenario), scenario, robot)
-        return build_mover(method, robot, body, numbers, scenario, arm=arm, synchronous=self._synchronous)
+        return build_adapter(method, robot, body, numbers, scenario, arm=arm, synchronous=self._synchronous)
 
     def _take_finer(self) -> None:
         """Lets a finer body be made, and takes it over when it is there."""
@@ -358,8 +358,8 @@ class Session:
             return
         self._events.tell(self.time, "finer body taken over")
         recipe = recipe_of(self._method, self._numbers[self._method.name], self.scenario)
-        if str(recipe) == USUAL and isinstance(self._mover, ControllerMover):
-            self._mover.set_arm(fine)
+        if str(recipe) == USUAL and isinstance(self._adapter, ControllerAdapter):
+            self._adapter.set_arm(fine)
 
     def stop(self) -> None:
         """Ends what runs beside the loop."""

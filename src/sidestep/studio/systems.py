@@ -15,8 +15,8 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import description_of
 from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.scenario import BodyConfig, MethodChoice
+from sidestep.studio.adapter import Adapter, ControllerAdapter
 from sidestep.studio.methods import METHODS
-from sidestep.studio.mover import ControllerMover, Mover
 from sidestep.studio.other_methods import methods_of_custom
 from sidestep.studio.parameters import Method, Numbers
 
@@ -86,7 +86,7 @@ def settings_of(written: Scenario, *, synchronous: bool = False) -> ControllerSe
     return controller_settings_of(dataclasses.replace(written, simulation=torque), synchronous=synchronous)
 
 
-def build_mover(
+def build_adapter(
     method: Method,
     robot: Robot,
     body: Body,
@@ -95,7 +95,7 @@ def build_mover(
     *,
     arm: Arm | None = None,
     synchronous: bool = False,
-) -> Mover:
+) -> Adapter:
     """What moves the arm by a method, with a body of its recipe, and the arm that is prepared with it, if it is.
 
     Raises:
@@ -104,8 +104,8 @@ def build_mover(
     written, tip = as_file(method, numbers, scenario), tip_of(robot)
     if method.controlled:
         settings = settings_of(written, synchronous=synchronous)
-        return ControllerMover(robot, arm or Arm.from_robot(robot, body), settings, tip)
-    return methods_of_custom().mover_of(written, robot, body, tip)
+        return ControllerAdapter(robot, arm or Arm.from_robot(robot, body), settings, tip)
+    return methods_of_custom().adapter_of(written, robot, body, tip)
 
 
 def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:

@@ -24,7 +24,7 @@ from sidestep.studio.page import colours
 from sidestep.studio.page.arm import short_names
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.parameters import Method, Numbers
-from sidestep.studio.systems import build_mover
+from sidestep.studio.systems import build_adapter
 
 if TYPE_CHECKING:
     import viser
@@ -182,7 +182,7 @@ class Surface:
 
     def _system_of(self, request: Request) -> GeometricSystem:
         if self._system is None or not self._system[0].same_system(request):
-            made = build_mover(
+            made = build_adapter(
                 request.method,
                 request.robot,
                 request.body,

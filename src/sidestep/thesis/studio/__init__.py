@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sidestep.scenario import Scenario
+from sidestep.thesis.studio.adapter import adapter_of
 from sidestep.thesis.studio.methods import METHODS, custom_scenario, numbers_of_custom
-from sidestep.thesis.studio.mover import mover_of
 
 if TYPE_CHECKING:
     from sidestep.studio.messages import Snapshot
@@ -21,4 +21,4 @@ def custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:
     return snippet.custom_code(snapshot, written)
 
 
-__all__ = ["METHODS", "custom_code", "custom_scenario", "mover_of", "numbers_of_custom"]
+__all__ = ["METHODS", "adapter_of", "custom_code", "custom_scenario", "numbers_of_custom"]

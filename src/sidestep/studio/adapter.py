@@ -14,7 +14,7 @@ from sidestep.arm import Arm
 from sidestep.robot import Robot
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
-from sidestep.studio.reason import Moment, Reason, binding, limit_in_words, reason_of
+from sidestep.studio.reason import EventRecord, Reason, binding, limit_in_words, reason_of
 
 Array = npt.NDArray[np.float64]
 
@@ -24,8 +24,8 @@ ASIDE = 1e-4  # [m] farther from where its velocity has brought it, an obstacle 
 
 
 @dataclass(frozen=True, eq=False)
-class Account:
-    """What a mover says of its last step.
+class StepRecord:
+    """What an adapter says of its last step.
 
     Attributes:
         words: what the arm does. status: of the command. activity: what the command is about, "" of other methods.
@@ -44,7 +44,7 @@ class Account:
     reason: Reason = field(default_factory=Reason)
 
 
-class Mover(Protocol):
+class Adapter(Protocol):
     """Moves the arm of a session by one method."""
 
     @property
@@ -68,14 +68,14 @@ class Mover(Protocol):
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
         """Takes a step without time passing."""
 
-    def account(self) -> Account | None:
+    def record(self) -> StepRecord | None:
         """Of the last step; None before one."""
 
-    def moment(self) -> Moment | None:
+    def event_record(self) -> EventRecord | None:
         """What events are told of, of the last step; None where there are none."""
 
 
-class ControllerMover:
+class ControllerAdapter:
     """A `Controller`, told what it sees where that is not as it was told before.
 
     Args:
@@ -150,13 +150,13 @@ class ControllerMover:
         """(nv, nv) of the last step."""
         return self._controller.geometric_step.metric
 
-    def account(self) -> Account | None:
+    def record(self) -> StepRecord | None:
         """Of the last step; None before one."""
         if self._said is None:
             return None
         command, step = self._said.command, self._said.geometric_step
         link = "" if command.coordinate < 0 else self._said.labels[command.coordinate].name
-        return Account(
+        return StepRecord(
             self._said.explain(),
             f"{status_name(command.status)}, {status_name(command.activity)}",
             status_name(command.activity),
@@ -167,14 +167,14 @@ class ControllerMover:
             reason_of(self._said, self._seen, self._q),
         )
 
-    def moment(self) -> Moment | None:
+    def event_record(self) -> EventRecord | None:
         """What events are told of, of the last step; None before one."""
         if self._said is None:
             return None
         command = self._said.command
         link, obstacle, _ = binding(self._said, self._seen)
         limit = limit_in_words(command.limits, self._robot.coordinate_names)
-        return Moment(
+        return EventRecord(
             command.activity, command.avoiding, self._said.searches, link, obstacle, command.status, limit
         )
 

@@ -13,14 +13,14 @@ from sidestep.scenario.assembly import POSTURE_STARTS
 from sidestep.scenario.torque_program import torque_qp_of
 from sidestep.simulation.pose_target import IkSolution, solve_ik
 from sidestep.simulation.run import status_name
-from sidestep.studio.mover import Account
+from sidestep.studio.adapter import StepRecord
 from sidestep.studio.reason import Reason
 from sidestep.thesis.custom import system_of
 
 Array = npt.NDArray[np.float64]
 
 
-class SystemMover:
+class SystemAdapter:
     """A geometric system, whose acceleration a torque program tracks; nothing keeps clearances.
 
     Args:
@@ -57,7 +57,7 @@ class SystemMover:
         assert self._step is not None
         return self._step.metric
 
-    def account(self) -> Account | None:
+    def record(self) -> StepRecord | None:
         """Of the last step; None before one."""
         step, solution = self._step, self._solution
         if step is None:
@@ -67,17 +67,17 @@ class SystemMover:
             status += f", torque program {status_name(solution.status)}"
         words = self.posture.in_words(step.diagnosis.describe())
         reason = Reason(pull=-step.goal_gradient)
-        return Account(words, status, values=step.values, metric=step.metric, reason=reason)
+        return StepRecord(words, status, values=step.values, metric=step.metric, reason=reason)
 
-    def moment(self) -> None:
+    def event_record(self) -> None:
         """No events: nothing is planned or kept off."""
 
 
-def mover_of(written: Scenario, robot: Robot, body: Body, tip: str) -> SystemMover:
+def adapter_of(written: Scenario, robot: Robot, body: Body, tip: str) -> SystemAdapter:
     """What moves the arm, of a scenario of method custom.
 
     Raises:
         ValueError: names the number at fault.
     """
     system = system_of(written.embedding, written.system, robot, body)
-    return SystemMover(robot, system, torque_qp_of(written, robot), tip)
+    return SystemAdapter(robot, system, torque_qp_of(written, robot), tip)
