@@ -220,7 +220,7 @@ def prepare(path: Path, cache: Path, problems: int) -> dict[str, Any]:
 
 def reach(arm: ss.Arm, path: Path, count: int) -> dict[str, Any]:
     """Counts over the first problems of seed 0."""
-    from sidestep.bench.motion import ControllerMover, MotionSettings
+    from sidestep.bench.motion import ControllerRunner, MotionSettings
     from sidestep.bench.outcome import Judge
     from sidestep.bench.problems import ProblemGenerator, ProblemSettings
     from sidestep.distance import SelfCollision
@@ -229,11 +229,11 @@ def reach(arm: ss.Arm, path: Path, count: int) -> dict[str, Any]:
     assert isinstance(robot, ss.Robot)  # it comes from a description
     own = SelfCollision(robot)
     generator = ProblemGenerator(ProblemSettings(robot=str(path)), robot=robot, self_collision=own)
-    judge, mover = Judge(robot, self_collision=own), ControllerMover(robot, arm)
+    judge, runner = Judge(robot, self_collision=own), ControllerRunner(robot, arm)
     outcomes = []
     for index in range(count):
         problem = generator.problem(index)
-        outcomes.append(judge.judge(problem, mover.move(problem, settings), settings))
+        outcomes.append(judge.judge(problem, runner.move(problem, settings), settings))
     return {
         "problems": count,
         "success": sum(item.success for item in outcomes),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sidestep import Arm, Body, Robot
-from sidestep.bench import ControllerMover, ProblemGenerator, ProblemSettings
+from sidestep.bench import ControllerRunner, ProblemGenerator, ProblemSettings
 
 
 @pytest.fixture(scope="session")
@@ -14,9 +14,9 @@ def generator() -> ProblemGenerator:
 
 
 @pytest.fixture(scope="session")
-def mover(generator: ProblemGenerator) -> ControllerMover:
+def runner(generator: ProblemGenerator) -> ControllerRunner:
     body = Body.cover(generator.robot, components=3, cache=False)
-    return ControllerMover(generator.robot, Arm.from_robot(generator.robot, body))
+    return ControllerRunner(generator.robot, Arm.from_robot(generator.robot, body))
 
 
 @pytest.fixture(scope="session")

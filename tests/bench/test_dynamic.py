@@ -85,10 +85,10 @@ def test_the_controller_sees_a_ball_from_the_moment_it_is_there() -> None:
     """Until then the motion is that among the balls at rest, and afterwards it is not."""
     problem = drawn(Kind.sudden)
     settings = MotionSettings(duration=problem.changes[0] + 0.5)
-    motion = arm().mover.move(problem, settings)
+    motion = arm().runner.move(problem, settings)
     steps = round(settings.duration / settings.period)
     alone = rollout(
-        arm().mover.system,
+        arm().runner.system,
         problem.start,
         np.zeros(3),
         problem.goal,

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sidestep.bench import ControllerMover, Judge, Motion, MotionSettings, ProblemGenerator, ReachProblem
+from sidestep.bench import ControllerRunner, Judge, Motion, MotionSettings, ProblemGenerator, ReachProblem
 
 SETTINGS = MotionSettings()
 
@@ -129,9 +129,9 @@ def test_a_state_that_is_not_finite_ends_the_motion(generator: ProblemGenerator,
 
 
 @pytest.mark.slow
-def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, mover: ControllerMover) -> None:
+def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, runner: ControllerRunner) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
-    motion = mover.move(problem, SETTINGS)
+    motion = runner.move(problem, SETTINGS)
     assert motion.arrived
     error = np.abs(motion.q - problem.goal).max(axis=1)
     assert error[-1] < 0.05 <= error[-2]
@@ -142,20 +142,20 @@ def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, mover: Cont
 
 
 def test_a_motion_that_does_not_arrive_has_a_row_for_every_step(
-    generator: ProblemGenerator, mover: ControllerMover
+    generator: ProblemGenerator, runner: ControllerRunner
 ) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
-    motion = mover.move(problem, MotionSettings(duration=0.6))
+    motion = runner.move(problem, MotionSettings(duration=0.6))
     assert not motion.arrived
     assert len(motion.q) == 600
 
 
 def test_a_safe_motion_keeps_every_limit(
-    generator: ProblemGenerator, mover: ControllerMover, judge: Judge
+    generator: ProblemGenerator, runner: ControllerRunner, judge: Judge
 ) -> None:
     settings = MotionSettings(duration=2.0)
     for index in range(2):
         problem = generator.problem(index)
-        outcome = judge.judge(problem, mover.move(problem, settings), settings)
+        outcome = judge.judge(problem, runner.move(problem, settings), settings)
         assert outcome.limits == {}
         assert not outcome.collision

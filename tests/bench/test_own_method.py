@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep.bench import BenchSettings, MotionSettings, OwnMover, ProblemSettings, run_bench
+from sidestep.bench import BenchSettings, MotionSettings, OwnMethodRunner, ProblemSettings, run_bench
 from sidestep.cli.bench_output import method_or_file
 from sidestep.robot import Robot
 
@@ -52,16 +52,16 @@ def test_the_method_of_the_page_runs(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named(tmp_path: Path) -> None:
     robot = Robot.named("planar3")
     with pytest.raises(FileNotFoundError, match=r"there is no file '.*none\.py'"):
-        OwnMover.from_file(tmp_path / "none.py", robot)
+        OwnMethodRunner.from_file(tmp_path / "none.py", robot)
     path = tmp_path / "empty.py"
     path.write_text("x = 1\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"defines no function method\(robot, problem\)"):
-        OwnMover.from_file(path, robot)
+        OwnMethodRunner.from_file(path, robot)
     path.write_text("def method(robot):\n    return lambda time, q, v: 0.0 * q\n", encoding="utf-8")
     with pytest.raises(
         ValueError, match=r"method must take \(robot, problem\): too many positional arguments"
     ):
-        OwnMover.from_file(path, robot)
+        OwnMethodRunner.from_file(path, robot)
     path.write_text("def method(robot, problem):\n    return lambda time, q, v: [1.0]\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"empty\.py: step gave \[1\.0\] in problem 0, must be 3 finite"):
         run_bench(settings(path))

@@ -17,10 +17,13 @@ from .faults import fault_table as fault_table
 from .faults import run_faults as run_faults
 from .method import Method as Method
 from .methods import build_mover as build_mover
+from .methods import build_runner as build_runner
 from .motion import ControllerMover as ControllerMover
+from .motion import ControllerRunner as ControllerRunner
 from .motion import Motion as Motion
 from .motion import MotionSettings as MotionSettings
 from .motion import Mover as Mover
+from .motion import ProblemRunner as ProblemRunner
 from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProblem
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .moving import MovingSettings as MovingSettings
@@ -29,6 +32,7 @@ from .moving import moving_table as moving_table
 from .moving import run_moving as run_moving
 from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
+from .own_method import OwnMethodRunner as OwnMethodRunner
 from .own_method import OwnMover as OwnMover
 from .parallel import default_jobs as default_jobs
 from .peers.run import run_peers as run_peers

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_mover
-from sidestep.bench.motion import Motion, MotionSettings, Mover
+from sidestep.bench.methods import build_runner
+from sidestep.bench.motion import Motion, MotionSettings, ProblemRunner
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import Problem, SceneProblem
@@ -40,13 +40,13 @@ class Arm:
     """One robot, with its joints locked as one kind of problem asks for it.
 
     Attributes:
-        robot: it. body: covers its links; the same for every opening of a gripper. mover: moves it.
+        robot: it. body: covers its links; the same for every opening of a gripper. runner: moves it.
         allowed: pairs of links that may touch. unknown: joints of the problem that it does not have.
     """
 
     robot: Robot
     body: Body
-    mover: Mover
+    runner: ProblemRunner
     allowed: tuple[Pair, ...] = ()
     unknown: tuple[str, ...] = ()
 
@@ -61,11 +61,11 @@ class Arm:
         unknown: tuple[str, ...] = (),
     ) -> Arm:
         """A robot with a body of it, moved by a method."""
-        return cls(robot, body, build_mover(method, robot, body), allowed, unknown)
+        return cls(robot, body, build_runner(method, robot, body), allowed, unknown)
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
         """Runs one problem."""
-        return self.mover.move(problem, settings)
+        return self.runner.move(problem, settings)
 
     @cached_property
     def judge(self) -> Judge:

@@ -7,7 +7,7 @@ from typing import Protocol
 from sidestep._core import BarrierSettings, Controller, ControllerSettings, GeometricSystem
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
-from sidestep.bench.motion import ControllerMover, Mover
+from sidestep.bench.motion import ControllerRunner, ProblemRunner
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress
 from sidestep.plugins import plugins
@@ -21,7 +21,7 @@ class BenchMethod(Protocol):
     def body(self, robot: Robot) -> Body:
         """The body that it needs, from the user's cache or made now."""
 
-    def mover(self, robot: Robot, body: Body) -> Mover:
+    def runner(self, robot: Robot, body: Body) -> ProblemRunner:
         """What moves a robot through problems."""
 
 
@@ -34,12 +34,12 @@ def build_body(
     return _brought(method).body(robot)
 
 
-def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover:
+def build_runner(method: Method, robot: Robot, body: Body | None = None) -> ProblemRunner:
     """What moves a robot by a method; by default with the body of `build_body`."""
     body = build_body(method, robot) if body is None else body
     if not method.safe:
-        return _brought(method).mover(robot, body)
-    return ControllerMover(robot, Arm.from_robot(robot, body), dict.fromkeys(ABLATIONS[method]))
+        return _brought(method).runner(robot, body)
+    return ControllerRunner(robot, Arm.from_robot(robot, body), dict.fromkeys(ABLATIONS[method]))
 
 
 def _brought(method: Method) -> BenchMethod:
@@ -60,3 +60,6 @@ def barrier_system(
     """
     settings = ControllerSettings(synchronous=True, planner=None, barriers=numbers or BarrierSettings())
     return Controller(Arm.from_robot(robot, body), settings).system
+
+
+build_mover = build_runner  # its name in 0.2

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -106,7 +106,7 @@ class Motion:
         return float(np.linalg.norm(np.diff(self.q, axis=0), axis=1).sum())
 
 
-class Mover(Protocol):
+class ProblemRunner(Protocol):
     """What moves an arm through problems."""
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
@@ -114,7 +114,7 @@ class Mover(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ControllerMover:
+class ControllerRunner:
     """The `Controller`, one for every problem, with the settings given in place of its defaults."""
 
     robot: Robot
@@ -303,3 +303,8 @@ def under_torque(
         run.arrived,
         np.array(timed.seconds),
     )
+
+
+# Their names in 0.2.
+Mover: TypeAlias = ProblemRunner
+ControllerMover: TypeAlias = ControllerRunner

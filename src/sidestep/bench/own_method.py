@@ -23,7 +23,7 @@ FUNCTION = "method"  # what the file defines
 
 
 @dataclass(frozen=True, eq=False)
-class OwnMover:
+class OwnMethodRunner:
     """Integrates the accelerations of a function of the user's: v += a T, q += v T.
 
     Args:
@@ -38,7 +38,7 @@ class OwnMover:
     name: str
 
     @classmethod
-    def from_file(cls, path: Path, robot: Robot) -> OwnMover:
+    def from_file(cls, path: Path, robot: Robot) -> OwnMethodRunner:
         """From a file that defines `method(robot, problem)`.
 
         Raises:
@@ -87,3 +87,6 @@ class OwnMover:
                 f"{self.name}: step gave {given!r} in problem {index}, must be {len(q)} finite accelerations"
             )
         return a
+
+
+OwnMover = OwnMethodRunner  # its name in 0.2

@@ -12,10 +12,10 @@ import numpy as np
 
 from sidestep._core import __version__
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_body, build_mover
-from sidestep.bench.motion import MotionSettings, Mover
+from sidestep.bench.methods import build_body, build_runner
+from sidestep.bench.motion import MotionSettings, ProblemRunner
 from sidestep.bench.outcome import Judge, Outcome, times_of
-from sidestep.bench.own_method import OwnMover
+from sidestep.bench.own_method import OwnMethodRunner
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
@@ -31,7 +31,7 @@ class BenchSettings:
 
     Attributes:
         problems: what is drawn, and the robot. count: how many, from index 0.
-        method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
+        method: how the arm is moved, or a Python file of `OwnMethodRunner`. motion: how problems are run.
         jobs: processes. draft: with a coarser body, which is made in seconds; of the controller.
         finer: where the arm does not arrive, and touches nothing, it is run again with finer covers of the links that
             may be why, see `tight_links`: twice at most.
@@ -180,18 +180,18 @@ def run_bench(
 
 def _prepared(
     settings: BenchSettings, name: str, progress: Progress | None
-) -> tuple[Robot, Body | None, Mover]:
+) -> tuple[Robot, Body | None, ProblemRunner]:
     """The robot, its body where the method has one, and what moves it."""
     robot = robot_from(name, settings.problems.options)
     if isinstance(settings.method, Path):
-        return robot, None, OwnMover.from_file(settings.method, robot)
+        return robot, None, OwnMethodRunner.from_file(settings.method, robot)
 
     def show(link: str, done: int, in_all: int) -> None:
         if progress is not None:
             progress(0, settings.count, f"preparing {link} ({done} of {in_all})")
 
     body = build_body(settings.method, robot, draft=settings.draft, progress=show)
-    return robot, body, build_mover(settings.method, robot, body)
+    return robot, body, build_runner(settings.method, robot, body)
 
 
 class _Worker:
@@ -199,19 +199,19 @@ class _Worker:
 
     def __init__(self, settings: BenchSettings, robot_name: str, *, progress: Progress | None = None) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot, self._body, self._mover = _prepared(settings, robot_name, progress)
+        self._robot, self._body, self._runner = _prepared(settings, robot_name, progress)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task
-        method, mover, body = self.settings.method, self._mover, self._body
+        method, runner, body = self.settings.method, self._runner, self._body
         while True:
-            motion = mover.move(problem, self.settings.motion)
+            motion = runner.move(problem, self.settings.motion)
             outcome = self._judge.judge(problem, motion, self.settings.motion)
             again = self.settings.finer and motion.tight and outcome.only_short_of_goal
             if not again or body is None or isinstance(method, Path):
                 return problem, outcome, times_of(motion)
             body = body.finer(self._robot, motion.tight)
-            mover = build_mover(method, self._robot, body)
+            runner = build_runner(method, self._robot, body)

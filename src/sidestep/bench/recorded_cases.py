@@ -9,7 +9,7 @@ from functools import partial
 from sidestep.arm import Arm
 from sidestep.bench import recorded_motions as motions
 from sidestep.bench import recorded_real_time as real_time
-from sidestep.bench.motion import ControllerMover, MotionSettings
+from sidestep.bench.motion import ControllerRunner, MotionSettings
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.robot import Robot
 
@@ -68,7 +68,7 @@ def _reach(name: str, *, torque: bool = False, poses: bool = False, moving: floa
     generator = ProblemGenerator(ProblemSettings(robot=name, moving=moving))
     motion = MotionSettings(duration=REACH_SECONDS, torque=torque, poses=poses)
     for index in range(3):
-        ControllerMover(robot, arm).move(generator.problem(index), motion)
+        ControllerRunner(robot, arm).move(generator.problem(index), motion)
 
 
 def _dynamic() -> None:

@@ -16,7 +16,7 @@ from sidestep.thesis.system import ThesisNumbers, thesis_system
 
 
 @dataclass(frozen=True, eq=False)
-class SystemMover:
+class SystemRunner:
     """A geometric system alone, as the thesis's methods are; under torque its acceleration is tracked."""
 
     robot: Robot
@@ -68,9 +68,9 @@ class ThesisMethod:
         """A mixture with the thesis's number of Gaussians."""
         return Body.fit(robot, components=ThesisNumbers().components)
 
-    def mover(self, robot: Robot, body: Body) -> SystemMover:
+    def runner(self, robot: Robot, body: Body) -> SystemRunner:
         """The system alone."""
-        return SystemMover(robot, thesis_system(robot, body, switched=self.switched))
+        return SystemRunner(robot, thesis_system(robot, body, switched=self.switched))
 
 
 SWITCHED, UNSWITCHED = ThesisMethod(switched=True), ThesisMethod(switched=False)
