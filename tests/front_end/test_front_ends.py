@@ -16,7 +16,7 @@ import pytest
 import sidestep as ss
 from sidestep import Scenario
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_mover
+from sidestep.bench.methods import build_runner
 from sidestep.bench.motion import MotionSettings
 from sidestep.bench.problems import ReachProblem
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
@@ -24,8 +24,8 @@ from sidestep.scenario import run_scenario
 from sidestep.scenario.assembly import assemble
 from sidestep.shipped_arms import shipped_file
 from sidestep.simulation import ControllerAdapter, Drive, KinematicRun, Simulation, SimulationRun
+from sidestep.studio.adapter import ControllerAdapter as StudioAdapter
 from sidestep.studio.export import scenario_now
-from sidestep.studio.mover import ControllerMover
 from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.systems import make_body
@@ -111,7 +111,7 @@ def of_scenario(method: str = "controller") -> Array:
 
 def of_bench(method: str = "controller") -> Array:
     return (
-        build_mover(Method(method), ss.Robot.named("fr3"))
+        build_runner(Method(method), ss.Robot.named("fr3"))
         .move(problem(), MotionSettings(period=PERIOD, duration=DURATION))
         .a
     )
@@ -121,7 +121,7 @@ def of_studio() -> Array:
     """The studio's mover, which in its physics asks for torque."""
     parts = assemble(scenario("kinematic"))
     assert isinstance(parts.mover, ss.Controller)
-    mover = ControllerMover(parts.robot, ss.Arm.load("fr3"), parts.mover.settings, "fr3_hand_tcp")
+    mover = StudioAdapter(parts.robot, ss.Arm.load("fr3"), parts.mover.settings, "fr3_hand_tcp")
     mover.set_goal(None, GOAL, thorough=True)
     q, v, found = START, np.zeros(7), []
     for k in range(STEPS):
@@ -225,7 +225,7 @@ def torques_of_scenario() -> Array:
 
 
 def torques_of_bench() -> Array:
-    mover = build_mover(Method.controller, ss.Robot.named("fr3"))
+    mover = build_runner(Method.controller, ss.Robot.named("fr3"))
     motion = mover.move(problem(), MotionSettings(period=PERIOD, duration=DURATION, torque=True))
     assert motion.torque is not None
     return motion.torque

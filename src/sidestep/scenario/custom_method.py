@@ -24,7 +24,7 @@ class CustomMethod(Protocol):
     ) -> GeometricSystem:
         """The system that a file writes out; raises ValueError where it does not fit the robot."""
 
-    def SystemAdapter(  # noqa: N802  (a class)
+    def SystemAdapter(
         self, system: GeometricSystem, goal: Any, obstacles: Any, torque_qp: Any, *, integrator: Any
     ) -> RunAdapter:
         """What drives the arm by it, with a torque program."""
