@@ -79,31 +79,12 @@ def swept_links(
         return {}
 
     def placed(values: Mapping[str, float]) -> dict[str, Array]:
-        """Pose of every link in the child of the last joint before it that moves."""
-        drives = drives_of(urdf, values)
-        found = {urdf.root: np.eye(4)}
-        for joint in kept:
-            X = found[joint.parent] @ joint.placement
-            if not joint.moves:
-                found[joint.child] = X @ poses.get(joint.name, np.eye(4))
-            elif drives[joint.name].source is None:
-                found[joint.child] = X @ joint_motion(joint, drives[joint.name].offset)
-            else:
-                found[joint.child] = np.eye(4)
-        return found
+        return _poses_in_moving(urdf, kept, {**locks, **values}, poses)
 
-    def num_steps(name: str) -> int:
-        lower, upper = ranges[name]
-        followers = [drive for drive in drives_of(urdf, {}).items() if drive[1].source == name]
-        turns = [
-            abs(drive.multiplier) for joint, drive in followers if urdf.joints[joint].type != "prismatic"
-        ]
-        return max(1, math.ceil((upper - lower) * sum(turns) / LARGEST_TURN))
-
-    middle = placed(locks)
-    grid = {name: np.linspace(*ranges[name], num_steps(name) + 1) for name in ranges}
+    middle = placed({})
+    grid = {name: np.linspace(*ranges[name], _num_steps(urdf, name, ranges[name]) + 1) for name in ranges}
     alone = {  # poses of links while one joint moves
-        name: [placed({**locks, name: float(value)}) for value in grid[name]] for name in ranges
+        name: [placed({name: float(value)}) for value in grid[name]] for name in ranges
     }
     found = {}
     for link, X in middle.items():
@@ -114,18 +95,12 @@ def swept_links(
         ]
         if not movers:
             continue
-        count = math.prod(len(grid[name]) - 1 for name in movers)
-        if count > MOST_CELLS:
-            names = ", ".join(map(repr, movers))
-            raise ValueError(
-                f"locked: link {link!r} is swept through {count} cells by the ranges of {names}, "
-                f"allowed: {MOST_CELLS}; give shorter ranges, or hold some of these joints at a value"
-            )
+        _check_cells(link, {name: len(grid[name]) - 1 for name in movers})
         cells = itertools.product(*(itertools.pairwise(grid[name]) for name in movers))
         sweeps = tuple(
             np.array(
                 [
-                    np.linalg.inv(X) @ placed({**locks, **dict(zip(movers, corner, strict=True))})[link]
+                    np.linalg.inv(X) @ placed(dict(zip(movers, corner, strict=True)))[link]
                     for corner in itertools.product(*cell)
                 ]
             )
@@ -136,3 +111,38 @@ def swept_links(
             whole, collisions=tuple(replace(shape, sweeps=sweeps) for shape in whole.geometries)
         )
     return found
+
+
+def _poses_in_moving(
+    urdf: Urdf, kept: Sequence[UrdfJoint], locks: Mapping[str, float], poses: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Pose of every link in the child of the last joint before it that moves."""
+    drives = drives_of(urdf, locks)
+    found = {urdf.root: np.eye(4)}
+    for joint in kept:
+        X = found[joint.parent] @ joint.placement
+        if not joint.moves:
+            found[joint.child] = X @ poses.get(joint.name, np.eye(4))
+        elif drives[joint.name].source is None:
+            found[joint.child] = X @ joint_motion(joint, drives[joint.name].offset)
+        else:
+            found[joint.child] = np.eye(4)
+    return found
+
+
+def _num_steps(urdf: Urdf, name: str, interval: tuple[float, float]) -> int:
+    """Into how many parts a range is cut, so that nothing turns far within one."""
+    lower, upper = interval
+    followers = [drive for drive in drives_of(urdf, {}).items() if drive[1].source == name]
+    turns = [abs(drive.multiplier) for joint, drive in followers if urdf.joints[joint].type != "prismatic"]
+    return max(1, math.ceil((upper - lower) * sum(turns) / LARGEST_TURN))
+
+
+def _check_cells(link: str, parts: Mapping[str, int]) -> None:
+    count = math.prod(parts.values())
+    if count > MOST_CELLS:
+        names = ", ".join(map(repr, parts))
+        raise ValueError(
+            f"locked: link {link!r} is swept through {count} cells by the ranges of {names}, "
+            f"allowed: {MOST_CELLS}; give shorter ranges, or hold some of these joints at a value"
+        )

@@ -72,15 +72,49 @@ def build_tree(
     names = [joint.name for joint in kept if joint.moves and drives[joint.name].source == joint.name]
     if not names:
         raise ValueError(f"{urdf.label} has no movable joint left; give another tip or lock fewer joints")
-    coordinates = {name: index for index, name in enumerate(names)}
+    joints, placed = _placed(urdf, kept, drives, names, poses, tip=tip, base_pose=base_pose)
+    limits = limits_of(
+        urdf,
+        names,
+        drives=drives,
+        acceleration=acceleration_limits,
+        velocity=velocity_limits,
+        effort=effort_limits,
+        jerk=jerk_limits,
+        effort_rate=effort_rate_limits,
+    )
+    driven = swept_links(urdf, kept, locks, ranges, poses)
+    links = tuple(driven.get(link, urdf.links[link]) for link in placed)
+    check_lengths(links, kept, joints, urdf.remarks)
+    check_meshes(links, joints, urdf.remarks)
+    frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
+    return KinematicTree(
+        tuple(joints),
+        frames,
+        tuple(names),
+        limits,
+        links,
+        {joint.name: drives[joint.name].offset for joint in kept if joint.moves and _held(drives, joint)},
+    )
 
+
+def _placed(
+    urdf: Urdf,
+    kept: Sequence[UrdfJoint],
+    drives: Mapping[str, Drive],
+    names: Sequence[str],
+    poses: Mapping[str, Array],
+    *,
+    tip: str | None,
+    base_pose: ArrayLike | None,
+) -> tuple[list[Joint], dict[str, tuple[int, Array]]]:
+    """The joints that move, parents first; and of each link the joint that it moves with, and its pose there."""
+    coordinates = {name: index for index, name in enumerate(names)}
     joints: list[Joint] = []
     root_pose = (
         np.eye(4) if base_pose is None else checked_pose(base_pose, "base_pose", tolerance=CORE_TOLERANCE)
     )
-    placed: dict[str, tuple[int, Array]] = {
-        urdf.root: (-1, root_pose)
-    }  # link -> its joint, pose in that joint
+    placed: dict[str, tuple[int, Array]] = {urdf.root: (-1, root_pose)}
     for joint in kept:
         parent, X_PL = placed[joint.parent]
         X_PJ = X_PL @ joint.placement
@@ -109,30 +143,7 @@ def build_tree(
             )
         )
         placed[joint.child] = (len(joints) - 1, np.eye(4))
-
-    limits = limits_of(
-        urdf,
-        names,
-        drives=drives,
-        acceleration=acceleration_limits,
-        velocity=velocity_limits,
-        effort=effort_limits,
-        jerk=jerk_limits,
-        effort_rate=effort_rate_limits,
-    )
-    driven = swept_links(urdf, kept, locks, ranges, poses)
-    links = tuple(driven.get(link, urdf.links[link]) for link in placed)
-    check_lengths(links, kept, joints, urdf.remarks)
-    check_meshes(links, joints, urdf.remarks)
-    frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
-    return KinematicTree(
-        tuple(joints),
-        frames,
-        tuple(names),
-        limits,
-        links,
-        {joint.name: drives[joint.name].offset for joint in kept if joint.moves and _held(drives, joint)},
-    )
+    return joints, placed
 
 
 def at_postures(
