@@ -55,7 +55,7 @@ def shapes_of(element: ElementTree.Element, description: Description, owner: str
     found = Shapes()
     for tag, into in (("collision", found.collisions), ("visual", found.visuals)):
         for item in element.findall(tag):
-            into += _geometries(item, description, owner, remarks, found)
+            into += _geometries(item, _Place(f"{owner}: <{tag}>", owner, description, remarks, found))
     if found.visual_faults and not found.faults:
         if found.collisions:
             for written, fault in found.visual_faults:
@@ -76,10 +76,19 @@ def _allowed() -> list[str]:
     return ["mesh", *(kind.kind for kind in solids)]
 
 
-def _geometries(
-    element: ElementTree.Element, description: Description, owner: str, remarks: Remarks, found: Shapes
-) -> list[Geometry]:
-    where = f"{owner}: <{element.tag}>"
+@dataclass(frozen=True)
+class _Place:
+    """The <collision> or <visual> that is read, and where goes what is found out about it."""
+
+    where: str
+    owner: str
+    description: Description
+    remarks: Remarks
+    found: Shapes
+
+
+def _geometries(element: ElementTree.Element, place: _Place) -> list[Geometry]:
+    where, remarks = place.where, place.remarks
     container = element.find("geometry")
     inside = [] if container is None else [item for item in container if isinstance(item.tag, str)]
     shapes = [item for item in inside if item.tag in _allowed()]
@@ -95,29 +104,19 @@ def _geometries(
     if len(shapes) > 1:
         remarks.add(SEVERAL_SHAPES, short(where))
     X = placement(element, where, remarks)
-    made = [_shape(shape, X, description, owner, where, remarks, found) for shape in shapes]
+    made = [_shape(shape, X, place) for shape in shapes]
     return [geometry for geometry in made if geometry is not None]
 
 
-def _shape(
-    shape: ElementTree.Element,
-    X: Array,
-    description: Description,
-    owner: str,
-    where: str,
-    remarks: Remarks,
-    found: Shapes,
-) -> Geometry | None:
+def _shape(shape: ElementTree.Element, X: Array, place: _Place) -> Geometry | None:
     if shape.tag == "mesh":
-        return _mesh(shape, X, description, owner, where, remarks, found)
+        return _mesh(shape, X, place)
+    where, remarks = place.where, place.remarks
     kind = KINDS[shape.tag]
     size: tuple[float, ...] = ()
-    for name, entries, *_ in kind.length_fields():
-        size += (
-            numbers(shape, name, where, remarks, count=entries)
-            if entries > 1
-            else (number(shape, name, where),)
-        )
+    for name, count, *_ in kind.length_fields():
+        one = count == 1
+        size += (number(shape, name, where),) if one else numbers(shape, name, where, remarks, count=count)
     if min(size) < 0.0:
         raise ValueError(f"{where}: {shape.tag} dimensions {size} must not be negative")
     what = f"{short(where)} {shape.tag} {size}"
@@ -133,15 +132,8 @@ def _shape(
     return Geometry(shape.tag, X, size=tuple(value or THICKNESS for value in size))
 
 
-def _mesh(
-    shape: ElementTree.Element,
-    X: Array,
-    description: Description,
-    owner: str,
-    where: str,
-    remarks: Remarks,
-    found: Shapes,
-) -> Geometry | None:
+def _mesh(shape: ElementTree.Element, X: Array, place: _Place) -> Geometry | None:
+    where, owner, remarks, found = place.where, place.owner, place.remarks, place.found
     scale = numbers(shape, "scale", where, remarks, count=3, default="1 1 1", fewer=(1,))
     if len(scale) == 1:
         remarks.add(ONE_SCALE, f"{short(where)} {shape.get('scale')!r}")
@@ -150,7 +142,7 @@ def _mesh(
         raise ValueError(f"{where}: mesh scale {scale} must not be zero")
     written = attribute(shape, "filename", where)
     visual = where.endswith("<visual>")
-    reference = resolve(written, owner, description.packages)
+    reference = resolve(written, owner, place.description.packages)
     path: Path | None = reference.path
     if path is None:
         found.missing = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, dataclass, fields
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, TypeGuard
 
@@ -85,16 +85,9 @@ class Shape(ABC):
     mujoco_factors: ClassVar[tuple[float, ...]] = ()
     coal_class: ClassVar[str | None] = None
 
-    if TYPE_CHECKING:  # fields of each kind: a size stands before them
-
-        @property
-        def pose(self) -> Array: ...
-
-        @property
-        def velocity(self) -> Array: ...
-
-        @property
-        def name(self) -> str | None: ...
+    pose: Array  # these are fields of each kind: sizes stand before them
+    velocity: Array
+    name: str | None
 
     def __post_init__(self) -> None:
         """Checks the fields, and keeps copies of pose and velocity that cannot be written to."""
@@ -124,6 +117,7 @@ class Shape(ABC):
         return hash((type(self), self.lengths, self.name))
 
     @classmethod
+    @cache
     def length_fields(cls) -> tuple[Length, ...]:
         """The lengths that make the kind."""
         return tuple(
@@ -139,8 +133,11 @@ class Shape(ABC):
     @property
     def lengths(self) -> tuple[float, ...]:
         """Its lengths [m] in a row."""
-        values = [np.ravel(getattr(self, name)).tolist() for name, *_ in self.length_fields()]
-        return tuple(float(value) for row in values for value in row)
+        row: list[float] = []
+        for entry in self.length_fields():
+            value = getattr(self, entry.name)
+            row += map(float, value if entry.number > 1 else [value])
+        return tuple(row)
 
     @classmethod
     def of_lengths(cls, lengths: Sequence[float]) -> Self:
