@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sidestep.math.pose import pose_at
 from sidestep.robot import tip_of
-from sidestep.robot.pose import pose_at
 from sidestep.scenario.assembly import coordinates, load_robot
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import GALLERY, MOUSE_BALL, ends_of

@@ -13,8 +13,8 @@ from python_code import Imports, room  # noqa: E402
 
 # As in CONTRIBUTING.md, "Layout". The thesis is beside them: it may use all, and none uses it.
 ORDER = (
-    *("extras", "plugins", "storage"),
-    *("robot", "shipped_arms", "obstacles", "drawing", "body", "distance", "arm"),
+    *("extras", "plugins", "storage", "math"),
+    *("shapes", "robot", "shipped_arms", "obstacles", "drawing", "body", "distance", "arm"),
     *("control", "controller", "planning", "system"),
     *("simulation", "scenario", "report", "bench", "studio", "cli", "__main__"),
     "thesis",

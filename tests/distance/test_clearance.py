@@ -9,7 +9,7 @@ import trimesh
 from sidestep import ExactClearance, Robot, SceneObject
 from sidestep.distance import sweep
 from sidestep.distance.travel import travel_per_joint
-from sidestep.robot.pose import from_quaternion, pose_vector
+from sidestep.math.pose import from_quaternion, pose_vector
 
 STRETCHED = np.zeros(2)  # planar2: link2 is a box from x = 0.5 to 1, y and z within half its width
 

@@ -7,8 +7,8 @@ import pytest
 
 from sidestep import Body, Robot, SceneObject
 from sidestep.distance import EllipsoidClearance
+from sidestep.math.pose import pose_at
 from sidestep.robot import planar_arm
-from sidestep.robot.pose import pose_at
 
 SEMI_AXES = np.array([0.3, 0.05, 0.02])
 

@@ -13,6 +13,7 @@ import sidestep as ss
 from sidestep import SceneObject
 from sidestep._core import Obstacles
 from sidestep.distance import seen_obstacles
+from sidestep.math.pose import pose_vector
 from sidestep.obstacles import (
     Box,
     Capsule,
@@ -23,7 +24,6 @@ from sidestep.obstacles import (
     obstacles_from_shapes,
     pose_at,
 )
-from sidestep.robot.pose import pose_vector
 
 
 @pytest.mark.parametrize(

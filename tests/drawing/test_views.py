@@ -12,7 +12,7 @@ from sidestep import Robot, SceneObject
 from sidestep.drawing import ArmViews, draw_arm
 from sidestep.drawing.arm import direction
 from sidestep.drawing.views import SIDES, fit_view, is_planar
-from sidestep.robot.pose import pose_at
+from sidestep.math.pose import pose_at
 
 MOTION = np.linspace([0.0, 0.0], [1.0, 0.5], 11)
 BALL = SceneObject.ball("ball", [0.6, 0.5, 0.0], radius=0.1)

@@ -19,7 +19,7 @@ from sidestep.bench.method import Method
 from sidestep.bench.methods import build_runner
 from sidestep.bench.motion import MotionSettings
 from sidestep.bench.problems import ReachProblem
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
+from sidestep.math.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import run_scenario
 from sidestep.scenario.assembly import assemble
 from sidestep.shipped_arms import shipped_file

@@ -13,7 +13,7 @@ import trimesh
 import sidestep as ss
 from sidestep.distance import ExactClearance
 from sidestep.obstacles import MeshShape, pose_at
-from sidestep.robot.mesh import read_mesh
+from sidestep.shapes.mesh_reader import read_mesh
 
 URDF = """<robot name="r"><link name="base"/><link name="tool"><collision><geometry>
 <mesh filename="{file}"/></geometry></collision></link><joint name="j" type="revolute"><parent link="base"/>

@@ -9,8 +9,8 @@ import pytest
 
 from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
 from sidestep.distance import SceneObject
+from sidestep.math.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot import Robot, planar_arm
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import Assembly, assemble, solids
 from sidestep.scenario.perception import seen_at, view_of

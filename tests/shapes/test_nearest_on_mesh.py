@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.mesh_reader import mesh_model
 from sidestep.shapes.nearest_on_mesh import MAX_PAIRS, NearestOnMesh
 
 MESHES = {

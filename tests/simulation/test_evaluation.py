@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sidestep import Robot, SceneObject, evaluate
-from sidestep.robot.pose import pose_at, pose_vector
+from sidestep.math.pose import pose_at, pose_vector
 from sidestep.simulation import Contact, KinematicRun, SimulationRun
 
 DT = 0.01

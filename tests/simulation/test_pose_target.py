@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sidestep import Obstacles, Robot
-from sidestep.robot.pose import pose_at
+from sidestep.math.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem

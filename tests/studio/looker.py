@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sidestep.robot.pose import from_quaternion
+from sidestep.math.pose import from_quaternion
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
 from sidestep.studio.headless import Window, find_chromium, go_to, new_page, picture

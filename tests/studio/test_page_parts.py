@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
-from sidestep.robot.pose import pose_at
+from sidestep.math.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.adapter import ControllerAdapter
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor, solid_poses

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sidestep import ExactClearance, Robot
+from sidestep.math.pose import pose_at
 from sidestep.robot import tip_of
-from sidestep.robot.pose import pose_at
 from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.page.camera import HALF, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.placing import CLEAR, Camera, free_place

@@ -12,8 +12,8 @@ import pytest
 import trimesh
 
 from sidestep import ExactClearance, Robot, Scenario
+from sidestep.math.pose import pose_at
 from sidestep.robot import tip_of
-from sidestep.robot.pose import pose_at
 from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m

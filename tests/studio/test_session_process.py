@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sidestep import Scenario
-from sidestep.robot.pose import pose_at
+from sidestep.math.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio import session_process
 from sidestep.studio.command_queue import CommandQueue, add

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from sidestep import _core
 from sidestep.body.cover_problem import EFFORTS, LinkProblem
 from sidestep.body.cover_refine import Ellipsoids
-from sidestep.robot.pose import checked_pose
+from sidestep.math.pose import checked_pose
 from sidestep.shapes import KINDS, Shape, Sphere, is_shape
 
 Array: TypeAlias = npt.NDArray[np.float64]

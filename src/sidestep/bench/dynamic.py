@@ -22,8 +22,8 @@ from sidestep.bench.scenes import SceneOutcome, SceneResult, SceneSettings, coll
 from sidestep.bench.step_times import StepTimes
 from sidestep.bench.workspace import Workspace
 from sidestep.distance import SceneObject
+from sidestep.math.pose import moved
 from sidestep.robot import Robot
-from sidestep.robot.pose import moved
 
 Array = npt.NDArray[np.float64]
 

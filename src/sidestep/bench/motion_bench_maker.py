@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
+from sidestep.math.pose import from_quaternion, pose_at
 from sidestep.obstacles import Box, Cylinder, Shape, Sphere
-from sidestep.robot.pose import from_quaternion, pose_at
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]

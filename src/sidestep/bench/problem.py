@@ -14,7 +14,7 @@ import numpy.typing as npt
 from sidestep._core import Obstacles
 from sidestep.distance import ExactClearance, SceneObject
 from sidestep.distance.scene import AWAY
-from sidestep.robot.pose import pose_vector
+from sidestep.math.pose import pose_vector
 
 Array = npt.NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.robot import Robot
 from sidestep.robot.any_source import is_name, robot_from
 from sidestep.robot.catalogue import RECIPES
-from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.mesh_reader import mesh_model
 
 Array = npt.NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from sidestep.body.cover_surface import Array
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
 from sidestep.body.sampling import links_with_geometry, sample_link
-from sidestep.robot.matrices import determinant, principal_axes, product
+from sidestep.math.matrices import determinant, principal_axes, product
 
 if TYPE_CHECKING:
     import trimesh

@@ -10,7 +10,7 @@ import numpy as np
 
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import Array, bisect
-from sidestep.robot.matrices import determinant
+from sidestep.math.matrices import determinant
 
 BATCH = 200_000  # triangles examined at once: bounds the memory
 

@@ -25,7 +25,7 @@ from sidestep.body.cover_refine import (
     refine,
 )
 from sidestep.body.cover_surface import Array, LinkSurface, SurfaceDetail, distinct_corners
-from sidestep.robot.mesh import simplified
+from sidestep.shapes.mesh_reader import simplified
 
 MEAN_AIM = 4e-3  # mean overshoot aimed at on a link of AIM_SIZE or more [m]
 MAX_AIM = 14.5e-3  # the largest, which is to be 15 mm: the search misses up to half a millimetre of a peak

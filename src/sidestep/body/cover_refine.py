@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from sidestep import _core
 from sidestep.body.cover_surface import Array, LinkSurface
-from sidestep.robot.matrices import determinant, inverse, principal_axes, product
+from sidestep.math.matrices import determinant, inverse, principal_axes, product
 
 _AT_ONCE = 4096  # points whose radii are computed together: they stay in the processor's cache
 

@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from sidestep._core import distance_to_triangles
-from sidestep.robot.matrices import principal_axes, product
+from sidestep.math.matrices import principal_axes, product
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -20,7 +20,7 @@ from sidestep.body.selection import (
     CriterionCurve,
     criterion_curve,
 )
-from sidestep.robot.matrices import inverse
+from sidestep.math.matrices import inverse
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot

@@ -14,7 +14,7 @@ from sidestep.body.body import Body
 from sidestep.body.fitting import ELLIPSOID_STD, LinkFit
 from sidestep.body.sampling import sample_link
 from sidestep.drawing.palette import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
-from sidestep.robot.pose import moved
+from sidestep.math.pose import moved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

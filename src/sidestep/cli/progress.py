@@ -65,7 +65,7 @@ class _Follower:
     """Updates the bar of a run now and then. Obstacles that were pushed are taken where they started."""
 
     def __init__(self, parts: Assembly, bar: Progress, task: object) -> None:
-        from sidestep.robot.pose import pose_vector
+        from sidestep.math.pose import pose_vector
 
         self._parts, self._bar, self._task = parts, bar, task
         self._clearance = ExactClearance(parts.robot, parts.objects) if parts.objects else None

@@ -27,8 +27,8 @@ from sidestep.distance.travel import (
     object_travel,
     travel_per_joint,
 )
+from sidestep.math.pose import from_quaternion, pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import from_quaternion, pose_vector
 
 Array = npt.NDArray[np.float64]
 

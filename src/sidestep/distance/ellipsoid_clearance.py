@@ -10,8 +10,8 @@ from sidestep.body import Body
 from sidestep.distance.clearance import Clearance
 from sidestep.distance.scene import Scene, check_scene
 from sidestep.distance.solid import object_solid
+from sidestep.math.pose import pose_at
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_at
 from sidestep.shapes import KINDS
 
 Array = npt.NDArray[np.float64]

@@ -14,7 +14,7 @@ from sidestep.distance.convex_parts import convex_parts
 from sidestep.distance.solid import hull_model
 from sidestep.distance.travel import interpolate_many, travel_per_joint
 from sidestep.robot import Robot
-from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.mesh_reader import mesh_model
 
 Array = npt.NDArray[np.float64]
 

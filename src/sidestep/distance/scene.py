@@ -12,7 +12,7 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles, real_array
-from sidestep.robot.pose import checked_pose, pose_at
+from sidestep.math.pose import checked_pose, pose_at
 from sidestep.shapes import KINDS, Fineness, Shape, Triangles, is_shape, kind_of
 
 Array = npt.NDArray[np.float64]

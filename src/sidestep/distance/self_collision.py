@@ -19,7 +19,7 @@ from sidestep.distance.link_parts import LinkParts, hulls_apart
 from sidestep.distance.sweep import smallest_distance
 from sidestep.distance.travel import interpolate, interpolate_many, travel_per_joint
 from sidestep.robot import Robot, read_srdf
-from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.mesh_reader import mesh_model
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]

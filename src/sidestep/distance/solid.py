@@ -11,8 +11,8 @@ import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 from sidestep.distance.scene import SceneObject
-from sidestep.robot.mesh import mesh_model
 from sidestep.shapes import Sphere
+from sidestep.shapes.mesh_reader import mesh_model
 
 Array = npt.NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import JointType
+from sidestep.math.pose import moved
 from sidestep.robot import Robot
-from sidestep.robot.pose import moved
 
 Array = npt.NDArray[np.float64]
 

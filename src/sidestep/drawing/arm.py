@@ -13,9 +13,9 @@ from matplotlib.colors import to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sidestep.drawing.palette import BLUE, FURNITURE, VERMILLION
+from sidestep.math.pose import moved, pose_matrix
 from sidestep.robot import Robot
-from sidestep.robot.mesh import simplified
-from sidestep.robot.pose import moved, pose_matrix
+from sidestep.shapes.mesh_reader import simplified
 
 Array = npt.NDArray[np.float64]
 Colour = tuple[float, float, float]

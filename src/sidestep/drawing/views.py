@@ -14,8 +14,8 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from sidestep._core import JointType
 from sidestep.drawing.arm import Array, Solid, arm_triangles, direction, draw_arm, show_arm, solid_triangles
 from sidestep.drawing.palette import BLUE, GREEN
+from sidestep.math.pose import moved, pose_matrix
 from sidestep.robot import Robot
-from sidestep.robot.pose import moved, pose_matrix
 
 DPI = 100
 FILLED = 0.94  # share of a picture that what must be seen fills

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep._core import Obstacles
+from sidestep.math.pose import moved
 from sidestep.obstacles.cloud_array import Points, read_npy, read_npz
 from sidestep.obstacles.cloud_pcd import read_pcd, read_viewpoint
 from sidestep.obstacles.cloud_ply import read_ply
 from sidestep.obstacles.cloud_text import read_text
 from sidestep.obstacles.voxels import merge_in_voxels
-from sidestep.robot.formats import LFS_POINTER
-from sidestep.robot.pose import moved
+from sidestep.shapes.mesh_file import LFS_POINTER
 
 FAR = 10.0  # [m] half of a cloud beyond this, or a point beyond ten times it, is warned of
 NOWHERE = 1e7  # [m] map coordinates do not go beyond this; a point that does stands for nothing seen

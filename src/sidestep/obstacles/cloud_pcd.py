@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sidestep.math.pose import from_quaternion, pose_at
 from sidestep.obstacles.cloud_array import Points, array_points
 from sidestep.obstacles.cloud_header import MAX_HEADER, read_header
 from sidestep.obstacles.cloud_text import fault_in
-from sidestep.robot.pose import from_quaternion, pose_at
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 COMPRESSION = 100  # at most, of the compression of PCD files: 264 bytes from 3

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sidestep.math.pose import about_axis, pose_at
 from sidestep.robot.link import Array, Link
-from sidestep.robot.pose import about_axis, pose_at
 from sidestep.robot.urdf_elements import Urdf, UrdfJoint
 
 MOST_CELLS = 2000  # of a link that several joints with a range move: each takes a millisecond

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
+from sidestep.math.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.link import Array
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.remarks import Remarks
 
 COMMAS = "there are commas between numbers, where spaces are asked for; they are left out"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from sidestep.shapes.mesh_file import LFS_POINTER
+
 _FROM_CAD = (
     "it holds shapes without joints; export URDF from the CAD program (Onshape: onshape-to-robot, SolidWorks: "
     "sw_urdf_exporter, Fusion: fusion2urdf)"
@@ -40,7 +42,6 @@ _SUFFIXES = {
     **dict.fromkeys((".stl", ".obj", ".ply", ".glb", ".gltf"), ("a mesh", _FROM_MESH)),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), ("a USD file", _FROM_USD)),
 }
-LFS_POINTER = b"version https://git-lfs"  # begins what stands for a file that Git LFS has not fetched
 
 
 def refuse_content(path: Path) -> None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sidestep.robot.matrices import determinant, product, transformed
-from sidestep.robot.mesh import MeshFile
+from sidestep.math.matrices import determinant, product, transformed
 from sidestep.shapes import Fineness, Shape, Triangles, kind_of
+from sidestep.shapes.mesh_reader import MeshFile
 
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh

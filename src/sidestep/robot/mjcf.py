@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sidestep.math.pose import about_axis, from_quaternion, pose_at
 from sidestep.robot.degrees import warn_of_degrees
 from sidestep.robot.formats import other_root
 from sidestep.robot.link import Array, Inertial, Link
@@ -26,7 +27,6 @@ from sidestep.robot.mjcf_joints import (
     limit_of,
     name_of,
 )
-from sidestep.robot.pose import about_axis, from_quaternion, pose_at
 from sidestep.robot.source import is_text
 from sidestep.robot.urdf_elements import Urdf, UrdfJoint, UrdfMimic
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sidestep.robot.mesh import read_mesh
-from sidestep.robot.mesh_file import fault_of
+from sidestep.shapes.mesh_file import fault_of
+from sidestep.shapes.mesh_reader import read_mesh
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
     import mujoco

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import re
 import tempfile
 from collections.abc import Iterable
@@ -15,10 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.math.pose import from_quaternion, pose_at
 from sidestep.robot.link import Array, Geometry
-from sidestep.robot.pose import from_quaternion, pose_at
 from sidestep.shapes import KINDS
 from sidestep.storage.user_cache import cache_root
+from sidestep.storage.whole_file import write_bytes
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
     import mujoco
@@ -99,21 +99,15 @@ def _stored(vertices: Array, faces: npt.NDArray[np.integer], name: str) -> Path:
     digest = hashlib.sha256(content).hexdigest()[:16]
     file = f"{re.sub(r'[^A-Za-z0-9_.-]', '_', name)[:60]}-{digest}.stl"
     with contextlib.suppress(OSError):
-        return _written(_cache_folder() / file, content)
+        return _written(cache_root() / "meshes" / file, content)
     return _written(_own_folder() / file, content)
 
 
 def _written(path: Path, content: bytes) -> Path:
     if not path.is_file() or path.stat().st_size != len(content):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(f".{os.getpid()}.part")
-        part.write_bytes(content)
-        part.replace(path)
+        write_bytes(path, content)
     return path
-
-
-def _cache_folder() -> Path:
-    return cache_root() / "meshes"
 
 
 @cache

@@ -8,9 +8,9 @@ import numpy as np
 
 from sidestep._core import Joint, JointType
 from sidestep.robot.link import Array, Geometry, Link
-from sidestep.robot.mesh_file import extents_of
 from sidestep.robot.remarks import Remarks
 from sidestep.robot.urdf_elements import UrdfJoint
+from sidestep.shapes.mesh_file import extents_of
 
 _NEGATIVE = 1e-6  # of the largest principal inertia: rounding of a file
 _TRIANGLE = 1e-2  # of the largest principal inertia: files write three digits

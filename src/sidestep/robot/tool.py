@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep import _core
+from sidestep.math.pose import checked_rotation, pose_at
 from sidestep.robot.link import Geometry, Inertial, Link
-from sidestep.robot.pose import checked_rotation, pose_at
 from sidestep.robot.tree import KinematicTree
 
 _ROTATION_TOLERANCE = 1e-9  # on R^T R - I; poses are written with at least this accuracy

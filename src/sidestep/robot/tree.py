@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType, real_array
+from sidestep.math.pose import checked_pose, from_roll_pitch_yaw, pose_at
 from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
 from sidestep.robot.drives import Drive, drives_of, joint_motion, swept_links
 from sidestep.robot.limits import LimitValues, limits_of, position_bounds, stands_still
 from sidestep.robot.link import Array, Link
 from sidestep.robot.plausibility import check_lengths, check_meshes
-from sidestep.robot.pose import checked_pose, from_roll_pitch_yaw, pose_at
 from sidestep.robot.urdf_elements import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own

@@ -10,11 +10,11 @@ import numpy as np
 
 from sidestep.robot.elements import attribute, number, numbers, placement, short
 from sidestep.robot.link import Array, Geometry
-from sidestep.robot.mesh_file import fault_of
 from sidestep.robot.references import resolve
 from sidestep.robot.remarks import Remarks
 from sidestep.robot.source import Description
 from sidestep.shapes import KINDS
+from sidestep.shapes.mesh_file import fault_of
 
 THICKNESS = (
     1e-3  # [m] of a shape that is written without one: thin against any arm, thick enough to be covered

@@ -19,9 +19,8 @@ from sidestep.arm import Arm
 from sidestep.body.cover_problem import EffortName
 from sidestep.distance import SceneObject
 from sidestep.distance.scene import check_scene
+from sidestep.math.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.degrees import degrees_hint
-from sidestep.robot.mesh import read_mesh
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.custom_method import RunAdapter, custom_method
 from sidestep.scenario.perception import View, cloud_balls, seen_at, view_of
@@ -38,6 +37,7 @@ from sidestep.scenario.shape import MeshSource
 from sidestep.scenario.torque_program import torque_qp_of
 from sidestep.scenario.validation import ScenarioError
 from sidestep.shapes import Shape, Sphere
+from sidestep.shapes.mesh_reader import read_mesh
 from sidestep.simulation import ControllerAdapter
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem

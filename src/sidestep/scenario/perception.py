@@ -11,8 +11,8 @@ import trimesh
 
 from sidestep._core import Obstacles
 from sidestep.distance import SceneObject
+from sidestep.math.pose import moved
 from sidestep.obstacles import load_point_cloud
-from sidestep.robot.pose import moved
 from sidestep.scenario.scenario import Obstacle
 from sidestep.scenario.shape import PointSource
 from sidestep.shapes import Sphere

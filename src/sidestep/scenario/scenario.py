@@ -17,6 +17,7 @@ from sidestep.scenario.config import MAX_LOOK_STEPS, Section, check_steps, secti
 from sidestep.scenario.shape import ObstacleShape, PointSource, document_of, shape_of
 from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
 from sidestep.shapes import Shape, Sphere
+from sidestep.storage.whole_file import write_text
 
 Vector3 = tuple[float, float, float]
 Locked = dict[str, float | str | tuple[float, float]]  # values, names of postures, ranges
@@ -281,9 +282,7 @@ class Scenario:
         text = yaml.safe_dump(
             document, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None
         )
-        part = target.with_name(target.name + ".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(target)
+        write_text(target, text)
 
     def file(self, name: str) -> Path:
         """The path of a file that the scenario names."""

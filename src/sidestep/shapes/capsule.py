@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sidestep.robot.pose import pose_at
+from sidestep.math.pose import pose_at
 from sidestep.shapes.ball_cover import check_count
 from sidestep.shapes.cylinder import Cylinder
 from sidestep.shapes.shape import FINE, Array, Balls, Fineness, Points, Shape, Trimesh, metres

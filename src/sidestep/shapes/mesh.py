@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from sidestep._core import real_array
-from sidestep.robot.mesh import MeshFile
+from sidestep.shapes.mesh_reader import MeshFile
 from sidestep.shapes.shape import FINE, Array, Balls, Fineness, Points, Shape, Trimesh
 
 

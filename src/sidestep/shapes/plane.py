@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sidestep.robot.pose import about_axis, pose_at
+from sidestep.math.pose import about_axis, pose_at
 from sidestep.shapes.ball_cover import cell_size, check_count, cover
 from sidestep.shapes.box import BoxCells
 from sidestep.shapes.shape import FINE, Array, Balls, Fineness, Points, Shape, Trimesh, metres, vector

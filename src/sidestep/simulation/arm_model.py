@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from sidestep._core import JointLimits, JointType
 from sidestep.distance.convex_parts import convex_parts
+from sidestep.math.pose import pose_at, pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_at, pose_vector
 from sidestep.simulation.contacts import ARM_BIT
 from sidestep.simulation.object_model import add_mesh
 

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from sidestep._core import real_array
 from sidestep.distance.scene import Scene, check_scene
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_vector
 from sidestep.simulation.adapter import KinematicAdapter
 from sidestep.simulation.pose_target import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, KinematicRun

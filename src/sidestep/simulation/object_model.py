@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 
 from sidestep.distance.scene import SceneObject
-from sidestep.robot.pose import pose_vector
+from sidestep.math.pose import pose_vector
 from sidestep.simulation.contacts import ARM_BIT, SCENE_BIT
 
 OBSTACLE_COLOUR = (0.80, 0.15, 0.13, 1.0)

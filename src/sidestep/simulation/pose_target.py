@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import PoseGoal, find_posture
+from sidestep.math.pose import rotation_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import rotation_vector
 
 Array = npt.NDArray[np.float64]
 

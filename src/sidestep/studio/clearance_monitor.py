@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from sidestep.distance import ExactClearance
 from sidestep.distance.clearance import Clearance
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_vector
 from sidestep.studio.messages import Row
 from sidestep.studio.scene_obstacle import SceneObstacle
 

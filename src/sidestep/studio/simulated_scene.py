@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.math.pose import from_quaternion, pose_at, pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import from_quaternion, pose_at, pose_vector
 from sidestep.simulation.model import build_model
 from sidestep.studio.messages import Course
 from sidestep.studio.scene_obstacle import SceneObstacle, thing_of

@@ -11,7 +11,7 @@ from sidestep._core import BarrierSettings, ClearanceBarrier, GeometricSystem
 from sidestep.bench.peers.way import FEWEST, Array, PeerSettings, States, Way, steps_in_cpp
 from sidestep.bench.peers.whole_arm import ArmAmongBalls, moving_links
 from sidestep.robot import Robot
-from sidestep.robot.mesh import mesh_model
+from sidestep.shapes.mesh_reader import mesh_model
 
 
 def distance_ways(settings: PeerSettings) -> tuple[States, list[Way]]:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Geometry, Robot
-from sidestep.robot.mesh import simplified
-from sidestep.robot.pose import pose_vector
+from sidestep.shapes.mesh_reader import simplified
 from sidestep.studio.page import colours
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_vector
 from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio import messages as m
 from sidestep.studio.page import colours

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep.distance.clearance import Clearance
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_vector
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import reach
 

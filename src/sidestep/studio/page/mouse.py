@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.robot.pose import from_quaternion, pose_at
+from sidestep.math.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import MOUSE_BALL, MOUSE_BALL_RADIUS
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.math.pose import from_quaternion, pose_at
 from sidestep.obstacles import load_point_cloud
-from sidestep.robot.pose import from_quaternion, pose_at
 from sidestep.shapes import Box
 from sidestep.studio import messages as m
 from sidestep.studio.page.goal import GoalControl

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.robot.pose import from_quaternion, pose_at, pose_vector
+from sidestep.math.pose import from_quaternion, pose_at, pose_vector
 from sidestep.shapes import Box, Sphere
 from sidestep.studio import messages as m
 from sidestep.studio.page import colours

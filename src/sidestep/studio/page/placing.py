@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.distance import ExactClearance, SceneObject
+from sidestep.math.pose import pose_at, pose_vector
 from sidestep.robot import Robot
-from sidestep.robot.pose import pose_at, pose_vector
 
 Array = npt.NDArray[np.float64]
 Ball = tuple[Array, float]  # centre (3,) and radius [m]

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, JointType, Obstacles
 from sidestep.body import Body
+from sidestep.math.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.robot.configurations import finite_interval
-from sidestep.robot.pose import pose_vector
 from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import method_named

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.drawing.palette import ORANGE
+from sidestep.math.pose import moved
 from sidestep.robot import Robot
-from sidestep.robot.pose import moved
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import SKIN, ArmView, BodyView, merged_meshes, reach
 from sidestep.studio.page.camera import Viewpoint

@@ -12,8 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sidestep.robot.formats import LFS_POINTER
-
+LFS_POINTER = b"version https://git-lfs"  # begins what stands for a file that Git LFS has not fetched
 _STL_HEADER = 84  # bytes: 80 of text, 4 of the number of triangles
 _STL_TRIANGLE = 50  # bytes
 _TAIL = 4096  # bytes at an end of a file, in which its header or last element is looked for

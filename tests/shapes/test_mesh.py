@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from sidestep.obstacles import MeshShape
-from sidestep.robot.mesh import read_mesh, simplified
+from sidestep.shapes.mesh_reader import read_mesh, simplified
 
 
 def test_files_that_are_no_mesh_are_named(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from sidestep.robot.collada_file import NOT_FINITE, shape_alone
-from sidestep.robot.mesh_file import fault_in, kind_in
+from sidestep.shapes.collada_file import NOT_FINITE, shape_alone
+from sidestep.shapes.mesh_file import fault_in, kind_in
 
 if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to import than a robot to load
     import coal

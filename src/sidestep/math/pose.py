@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
-from sidestep.robot.matrices import determinant, product
+from sidestep.math.matrices import determinant, product
 
 Array = npt.NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sidestep.robot.pose import (
+from sidestep.math.pose import (
     about_axis,
     checked_pose,
     from_roll_pitch_yaw,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sidestep.robot.matrices import determinant, inverse, principal_axes, product, transformed
-from sidestep.robot.pose import about_axis, pose_at
+from sidestep.math.matrices import determinant, inverse, principal_axes, product, transformed
+from sidestep.math.pose import about_axis, pose_at
 
 
 def test_products_inverses_and_determinants_by_value() -> None:

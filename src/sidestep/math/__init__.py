@@ -1,0 +1,1 @@
+"""Rigid poses, and products of small matrices that are the same everywhere."""
