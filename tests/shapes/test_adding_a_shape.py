@@ -95,6 +95,10 @@ def test_balls_hold_it_and_reach_out_by_no_more_than_the_excess(cone: type[Shape
     assert (np.maximum(beyond_side, -local[:, 2]) + seen.radii).max() <= 0.002 + ROUNDING
     assert seen.name_of(0) == "hat"
     np.testing.assert_array_equal(seen.velocities[0], [0.1, 0.0, 0.0])
+    with pytest.raises(
+        ValueError, match=r"excess is 0\.0001, must be more than the bulge of a cone, 0\.00012 m"
+    ):
+        shape.balls(1e-4)
     samples = shape.sample(0.03)
     gaps = np.linalg.norm(surface_of(pose)[:, None] - samples[None], axis=2).min(axis=1)
     assert gaps.max() <= 0.03

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sidestep._core import real_array
-from sidestep.robot.pose import checked_pose, moved
+from sidestep.math.pose import checked_pose, moved
 from sidestep.shapes.ball_cover import EXCESS, check_excess
 
 if TYPE_CHECKING:  # imported where they are used: they take longer to import than a shape to make
@@ -187,13 +187,13 @@ class Shape(ABC):
         """Points (N, 3) [m] in its own frame; every point of the surface is within `spacing` of one."""
         from sidestep.shapes import surface_points
 
-        return surface_points.triangles(self.surface(), spacing - self.bulge)
+        return surface_points.triangles(self.surface(), self._beyond_bulge("spacing", spacing))
 
     def cover(self, excess: float) -> Balls:
         """Balls as of `balls`, in its own frame, by what only this kind knows."""
         from sidestep.shapes import mesh_cover
 
-        centres, radii = mesh_cover.mesh_balls(self.surface(), excess - self.bulge)
+        centres, radii = mesh_cover.mesh_balls(self.surface(), self._beyond_bulge("excess", excess))
         return centres, radii + self.bulge
 
     def coal(self) -> coal.CollisionGeometry | None:
@@ -223,6 +223,13 @@ class Shape(ABC):
     def mesh(self) -> Trimesh:
         """The surface as triangles in the world [m]; of a round one with corners on it, and inside."""
         return self.surface().copy().apply_transform(self.pose)
+
+    def _beyond_bulge(self, name: str, value: float) -> float:
+        if value <= self.bulge:
+            raise ValueError(
+                f"{name} is {value}, must be more than the bulge of a {self.kind}, {self.bulge:.2g} m"
+            )
+        return value - self.bulge
 
     @property
     def _owner(self) -> str:

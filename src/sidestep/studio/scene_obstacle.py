@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.distance import SceneObject
+from sidestep.math.pose import moved, pose_at
 from sidestep.obstacles import merge_in_voxels
-from sidestep.robot.pose import from_roll_pitch_yaw, moved, pose_at
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import solids
+from sidestep.scenario.assembly import pose_of, solids
 from sidestep.scenario.perception import View, cloud_balls, view_of
 from sidestep.scenario.scenario import Obstacle, Vector3
 from sidestep.scenario.shape import PointSource
@@ -51,9 +51,7 @@ class SceneObstacle:
     @cached_property
     def start(self) -> Array:
         """Pose (4, 4) in the world at the start."""
-        return pose_at(
-            self.obstacle.position, from_roll_pitch_yaw(np.deg2rad(self.obstacle.rotation_deg).tolist())
-        )
+        return pose_of(self.obstacle)
 
     @property
     def cloud(self) -> Array | None:
