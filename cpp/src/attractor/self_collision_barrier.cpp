@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../robot/kernels/most_lanes.hpp"
+#include "../math/kernels/most_lanes.hpp"
 
 namespace sidestep {
 namespace {

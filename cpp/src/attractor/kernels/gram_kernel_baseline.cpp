@@ -1,7 +1,7 @@
 // For every processor of the architecture.
 #include "gram_kernel.hpp"
 
-#include "../../robot/kernels/intrinsics.hpp"
+#include "../../math/kernels/intrinsics.hpp"
 
 #include "gram_kernel.inl"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "../../robot/kernels/most_lanes.hpp"
+#include "../../math/kernels/most_lanes.hpp"
 #include "sidestep/scene/balls.hpp"
 
 // The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a

@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../robot/kernels/lanes.inl"
+#include "../../math/kernels/lanes.inl"
 
 #include "clearance_sums.inl"
 

@@ -1,7 +1,7 @@
 // For every processor of the architecture.
 #include "distance_kernel.hpp"
 
-#include "../../robot/kernels/intrinsics.hpp"
+#include "../../math/kernels/intrinsics.hpp"
 
 #include "distance_kernel.inl"
 

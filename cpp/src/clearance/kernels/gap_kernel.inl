@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../robot/kernels/lanes.inl"
+#include "../../math/kernels/lanes.inl"
 
 constexpr int most_steps = 16;
 constexpr int most_halvings = 8;

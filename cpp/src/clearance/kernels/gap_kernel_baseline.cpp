@@ -1,7 +1,7 @@
 // For every processor of the architecture.
 #include "gap_kernel.hpp"
 
-#include "../../robot/kernels/intrinsics.hpp"
+#include "../../math/kernels/intrinsics.hpp"
 
 #include "gap_kernel.inl"
 

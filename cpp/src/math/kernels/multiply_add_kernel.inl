@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../robot/kernels/lanes.inl"
+#include "lanes.inl"
 
 // As many as two units with a latency of four or five cycles take, and registers hold.
 constexpr int chains = 12;

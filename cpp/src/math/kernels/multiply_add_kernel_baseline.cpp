@@ -1,7 +1,7 @@
 // For every processor of the architecture, see CMakeLists.txt.
 #include "multiply_add_kernel.hpp"
 
-#include "../../robot/kernels/intrinsics.hpp"
+#include "intrinsics.hpp"
 
 #include "multiply_add_kernel.inl"
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "link_numbers.hpp"
-#include "most_lanes.hpp"
+#include "../../math/kernels/most_lanes.hpp"
 
 // The loop over joints of KinematicState, once per instruction set. Plain arrays only: a translation unit compiled for
 // a newer instruction set must not emit code that others share, such as Eigen's inline functions.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "../../robot/kernels/most_lanes.hpp"
+#include "../../math/kernels/most_lanes.hpp"
 
 // The inner loop of CollisionDensity, once per instruction set. Plain arrays only, see clearance_kernel.hpp.
 namespace sidestep::kernels {
