@@ -12,9 +12,7 @@
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/attractor/clearance_barrier.hpp"
-#include "sidestep/attractor/clearance_table_barrier.hpp"
 #include "sidestep/attractor/joint_limit_barrier.hpp"
-#include "sidestep/attractor/self_collision_barrier.hpp"
 #include "sidestep/math/instruction_set.hpp"
 #include "sidestep/math/multiply_add_rate.hpp"
 
@@ -115,8 +113,9 @@ void bind_embedding(nb::module_& m) {
       .def_prop_ro("components",
                    [](const ClearanceBarrier& b) {
                      std::vector<int> components;
-                     for (int k = 0; k < b.field().size(); ++k) {
-                       components.push_back(b.field().component(k));
+                     const auto& field = dynamic_cast<const ClearanceField&>(b.group());
+                     for (int k = 0; k < field.size(); ++k) {
+                       components.push_back(field.component(k));
                      }
                      return components;
                    },
@@ -213,7 +212,7 @@ void bind_embedding(nb::module_& m) {
              const std::vector<std::string>& links, double activation, double strength, double power, double floor,
              double temperature, double reach) {
             check_fitted_to(robot, body);
-            new (self) PlaneBarrier(robot, body, as_vector(point, "point", 3), as_vector(normal, "normal", 3), links,
+            new (self) PlaneBarrier(robot, body, {as_vector(point, "point", 3), as_vector(normal, "normal", 3), links},
                                     {activation, strength, power, floor}, temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("point"), nb::arg("normal"), nb::arg("links"),

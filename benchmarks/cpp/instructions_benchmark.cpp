@@ -13,7 +13,6 @@
 #include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/thesis/collision_density.hpp"
 #include "sidestep/attractor/joint_limit_barrier.hpp"
-#include "sidestep/attractor/self_collision_barrier.hpp"
 
 int main(int argc, char** argv) {
   using namespace sidestep;

@@ -33,7 +33,7 @@ struct Motion {
 
 void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
-    const Joint& joint = robot_.joints()[i];
+    const Joint& joint = robot().joints()[i];
     const Workspace::Pose& parent = pose(w, joint.parent);
     Workspace::Pose& child = w.poses_[i];
     const Eigen::Vector3d rate = joint.multiplier * velocity[joint.coordinate] * (child.R * joint.axis);
@@ -43,21 +43,22 @@ void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   }
 }
 
-double BodyClearance::speed(const Item& item, Workspace& w) const noexcept {
-  if (item.load >= 0) {
-    static_cast<void>(holding_->at(holding_->loads()[static_cast<std::size_t>(item.load)], state(w), w.gradient_));
+double BodyClearance::speed(const ClearanceItem& item, Workspace& w) const noexcept {
+  if (item.source == ClearanceItem::Source::load) {
+    const HoldingTorque& holding = *items_->holding();
+    static_cast<void>(holding.at(holding.loads()[static_cast<std::size_t>(item.index)], state(w), w.gradient_));
     return std::abs(w.gradient_.dot(w.difference_));
   }
-  if (item.table >= 0) {
+  if (item.source == ClearanceItem::Source::table) {
     return item.reach.dot(w.lengths_);
   }
   const Workspace::Pose& base = pose(w, item.base);
   double sum = 0.0;
   for (const int n : {item.link, item.other}) {
-    if (n < 0 || links_[static_cast<std::size_t>(n)].joint == item.base) {
+    if (n < 0 || items_->links()[n].joint == item.base) {
       continue;
     }
-    const Link& link = links_[static_cast<std::size_t>(n)];
+    const LinkEllipsoids& link = items_->links()[n];
     const Workspace::Pose& X = pose(w, link.joint);
     const Eigen::Vector3d& centre = w.centres_[static_cast<std::size_t>(n)];
     const Eigen::Vector3d linear = X.linear + X.angular.cross(centre - X.p) - base.linear - base.angular.cross(centre - base.p);
@@ -70,18 +71,18 @@ void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) con
   const Eigen::Index nv = displacement.size();
   w.difference_ = displacement;
   w.lengths_ = displacement.cwiseAbs();
-  w.motions_.noalias() = reaches_ * w.lengths_;
+  w.motions_.noalias() = items_->reaches() * w.lengths_;
   for (Eigen::Index i = 0, k = 0; i < nv; k += nv, ++i) {
     w.products_.segment(k, nv) = w.lengths_[i] * w.lengths_;
   }
-  w.curvatures_.noalias() = bends_ * w.products_;
+  w.curvatures_.noalias() = items_->bends() * w.products_;
 }
 
 double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept {
   place(q, w);
   bound_motions(displacement, w);
   move(displacement, w);
-  const Motion moved{w.motions_[item], 0.0, speed(items_[static_cast<std::size_t>(item)], w), w.curvatures_[item]};
+  const Motion moved{w.motions_[item], 0.0, speed((*items_)[item], w), w.curvatures_[item]};
   return moved.distance(1.0);
 }
 
@@ -91,7 +92,7 @@ double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margi
     const double deficit = end.deficits[item];
     if (deficit > 0.0) {
       slope = std::max(slope, deficit / margins.fade);
-      const double away = items_[static_cast<std::size_t>(item)].reach.dot((q - end.q).cwiseAbs());
+      const double away = (*items_)[item].reach.dot((q - end.q).cwiseAbs());
       lowered = std::max(lowered, deficit * std::max(0.0, 1.0 - away / margins.fade));
     }
   }
@@ -109,7 +110,7 @@ bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Mar
     // In the order of the items, but the one that was in the way last before all.
     const int i = k == 0 ? w.last_ : (k <= w.last_ ? k - 1 : k);
     const double margin = margin_at(i, q, margins, slope);
-    if (look(items_[static_cast<std::size_t>(i)], obstacles, {margin, margin, margin}, w).clearance < margin) {
+    if (look((*items_)[i], obstacles, {margin, margin, margin}, w).clearance < margin) {
       w.last_ = i;
       return false;
     }
@@ -126,7 +127,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacle
   w.field_.follow(obstacles);
   const std::size_t words = this->words();
   std::fill_n(w.open_.begin(), words, ~std::uint64_t{0});
-  w.open_[words - 1] >>= 64 * words - items_.size();
+  w.open_[words - 1] >>= 64 * words - static_cast<std::size_t>(num_items());
   bound_motions(w.difference_, w);
   // Breadth first: what is in the way is found early.
   w.intervals_.clear();
@@ -142,7 +143,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacle
       for (std::uint64_t left = std::exchange(open[word], 0); left != 0; left &= left - 1) {
         const int bit = std::countr_zero(left);
         const int i = static_cast<int>(word) * 64 + bit;
-        const Item& item = items_[static_cast<std::size_t>(i)];
+        const ClearanceItem& item = (*items_)[i];
         double slope = 0.0;
         const double least = margin_at(i, w.q_, margins, slope);
         const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};

@@ -1,5 +1,9 @@
 #include "sidestep/clearance/boltzmann_mean.hpp"
 
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
 namespace sidestep {
 
 bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
@@ -41,6 +45,14 @@ ClearanceSample BoltzmannMean::result() const noexcept {
   mean.gradient.scale(1.0 / sums_.s0);
   mean.value += reference_;
   return mean;
+}
+
+double checked_temperature(double temperature, const char* owner) {
+  if (!(temperature > 0.0) || !std::isfinite(temperature)) {
+    throw std::invalid_argument(std::string(owner) + ": temperature is " + std::to_string(temperature) +
+                                " m, must be positive and finite");
+  }
+  return temperature;
 }
 
 }  // namespace sidestep

@@ -17,6 +17,8 @@
 namespace sidestep {
 namespace {
 
+constexpr const char* field_owner = "clearance field";
+
 kernels::ClearanceKernel clearance_kernel() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)(); }
 
 void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
@@ -121,18 +123,13 @@ class Means {
 }  // namespace
 
 ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature, double window)
-    : temperature_(temperature), window_(window) {
-  constexpr const char* owner = "clearance field";
-  if (!(temperature > 0.0) || temperature == infinity) {
-    throw std::invalid_argument(std::string(owner) + ": temperature is " + std::to_string(temperature) +
-                                " m, must be positive and finite");
-  }
+    : temperature_(checked_temperature(temperature, field_owner)), window_(window), links_(body.links) {
   constexpr double most_window = 600.0;  // beyond e^−700 the exponential of the sums ends
   if (!(window >= 1.0 && window <= most_window)) {
-    throw std::invalid_argument(std::string(owner) + ": window is " + std::to_string(window) +
+    throw std::invalid_argument(std::string(field_owner) + ": window is " + std::to_string(window) +
                                 " temperatures, must be from 1 to 600");
   }
-  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, owner)) {
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, field_owner)) {
     if (ellipsoid.joint >= 0) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(ellipsoid.shape);
       Eigen::Matrix3d axes = eigen.eigenvectors();
@@ -141,7 +138,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
     }
   }
   if (ellipsoids_.empty()) {
-    throw std::invalid_argument(std::string(owner) + ": no ellipsoid of the body lies on a link that a joint of robot '" +
+    throw std::invalid_argument(std::string(field_owner) + ": no ellipsoid of the body lies on a link that a joint of robot '" +
                                 robot.name() + "' moves");
   }
   for (int first = 0; first < size();) {
@@ -419,6 +416,10 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       }
     }
   }
+}
+
+CoordinateLabel ClearanceField::label(int k) const {
+  return {CoordinateLabel::Kind::obstacle, links_[static_cast<std::size_t>(component(k))]};
 }
 
 bool ClearanceField::touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept {

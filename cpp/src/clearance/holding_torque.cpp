@@ -161,43 +161,30 @@ HoldingTorque::Room HoldingTorque::at(const Load& load, const KinematicState& st
   return {(load.effort - std::abs(torque)) / load.weight, gradient.dot(state.v()), per * curvature};
 }
 
-HoldingTorqueBarrier::HoldingTorqueBarrier(HoldingTorque holding, BarrierFunction barrier)
-    : Barrier(holding.robot(), barrier, "holding torque barrier"), holding_(std::move(holding)) {
-  if (holding_.loads().empty()) {
-    throw std::invalid_argument("holding torque barrier: no joint of robot '" + robot().name() +
-                                "' can come near its effort limit");
-  }
-  set_num_coordinates(static_cast<int>(holding_.loads().size()));
-  for (std::size_t k = 0; k < holding_.loads().size(); ++k) {
-    shorten_activation(static_cast<int>(k), holding_.loads()[k].activation);
-  }
-}
-
-void HoldingTorqueBarrier::add_to(EmbeddingView out, const KinematicState& state,
-                                  const Obstacles& /*obstacles*/) const noexcept {
-  const Horizon ahead = horizon(state);
-  for (std::size_t i = 0; i < holding_.loads().size(); ++i) {
+void HoldingTorque::evaluate(const KinematicState& state, const Obstacles& /*obstacles*/, double /*reach*/,
+                             const Horizon& ahead, ClearanceView out) const noexcept {
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    const HoldingTorque::Room room = holding_.at(holding_.loads()[i], state, out.clearances.gradients.col(k));
-    if (!(room.value < activations()[k]) && !(room.value + ahead.time * room.rate < activations()[k])) {
+    const Room room = at(loads_[i], state, out.gradients.col(k));
+    const double within = std::min(ahead.distance, loads_[i].activation);
+    if (!(room.value < within) && !(room.value + ahead.time * room.rate < within)) {
       continue;
     }
-    out.clearances.values[k] = room.value;
-    out.clearances.rates[k] = room.rate;
-    out.clearances.curvatures[k] = room.curvature;
-    ClearanceStateView& approach = out.clearances.approach;
-    approach.values[k] = room.value;
-    approach.rates[k] = room.rate;
-    approach.curvatures[k] = room.curvature;
-    approach.gradients.col(k) = out.clearances.gradients.col(k);
-    out.clearances.nearest[k] = 0;
+    const auto write = [&](ClearanceStateView& to) {
+      to.values[k] = room.value;
+      to.rates[k] = room.rate;
+      to.curvatures[k] = room.curvature;
+    };
+    write(out);
+    write(out.approach);
+    out.approach.gradients.col(k) = out.gradients.col(k);
+    out.nearest[k] = 0;
   }
-  add_barriers(out);
 }
 
-CoordinateLabel HoldingTorqueBarrier::label(int k) const {
-  const int coordinate = holding_.loads()[static_cast<std::size_t>(k)].coordinate;
-  return {CoordinateLabel::Kind::effort, robot().coordinate_names()[static_cast<std::size_t>(coordinate)], {}, floor(k)};
+CoordinateLabel HoldingTorque::label(int k) const {
+  const int coordinate = loads_[static_cast<std::size_t>(k)].coordinate;
+  return {CoordinateLabel::Kind::effort, robot_.coordinate_names()[static_cast<std::size_t>(coordinate)]};
 }
 
 }  // namespace sidestep

@@ -52,19 +52,20 @@ Eigen::Matrix3Xd middles_of(const ClearanceField& field, const Body& body) {
 
 }  // namespace
 
-ClosingEstimate::ClosingEstimate(const Robot& robot, const Body& body, double temperature, double margin)
+ClosingEstimate::ClosingEstimate(const Robot& robot, const Body& body, std::shared_ptr<const ClearanceField> field,
+                                 double margin)
     : robot_(robot),
-      field_(robot, body, temperature),
+      field_(std::move(field)),
       margin_(margin),
-      links_(links_of(field_, body)),
-      middles_(middles_of(field_, body)),
+      links_(links_of(*field_, body)),
+      middles_(middles_of(*field_, body)),
       state_(robot),
       rest_(Eigen::VectorXd::Zero(robot.num_coordinates())),
-      before_(robot.num_coordinates(), field_.size()),
+      before_(robot.num_coordinates(), field_->size()),
       now_(before_),
-      tracks_(static_cast<std::size_t>(field_.size()), Track{.noise = first_noise, .differences = assumed}),
+      tracks_(static_cast<std::size_t>(field_->size()), Track{.noise = first_noise, .differences = assumed}),
       doubts_(tracks_.size()),
-      speeds_(Eigen::VectorXd::Zero(field_.size())) {}
+      speeds_(Eigen::VectorXd::Zero(field_->size())) {}
 
 void ClosingEstimate::go_on_from(const ClosingEstimate& before) noexcept {
   begun_ = before.begun_;
@@ -96,7 +97,7 @@ void ClosingEstimate::go_on_from(const ClosingEstimate& before) noexcept {
 void ClosingEstimate::evaluate(const Obstacles& obstacles, Clearances& out) noexcept {
   out.clear();
   if (obstacles.size() > 0) {
-    field_.evaluate(state_, obstacles, reach, Horizon{}, out.view(0, field_.size()));
+    field_->evaluate(state_, obstacles, reach, Horizon{}, out.view(0, field_->size()));
   }
 }
 

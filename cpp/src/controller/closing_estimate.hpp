@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,8 +37,8 @@ namespace sidestep {
 /// Coordinates are those of the field, which come first among those of a controller's system. Nothing allocates after construction.
 class ClosingEstimate {
  public:
-  /// `temperature` of the clearances and their `margin` [m].
-  ClosingEstimate(const Robot& robot, const Body& body, double temperature, double margin);
+  /// `field`: the clearances, of that body; `margin`: theirs [m].
+  ClosingEstimate(const Robot& robot, const Body& body, std::shared_ptr<const ClearanceField> field, double margin);
 
   /// The arm is at q (nv); `before`, which has been moved on to this moment, is about to be replaced. Only read, and not kept.
   void leave(ConstVectorRef q, const Obstacles& before) noexcept;
@@ -87,7 +88,7 @@ class ClosingEstimate {
   void doubt(Eigen::Index k, double before, double now, double duration, double time) noexcept;
 
   const Robot robot_;
-  const ClearanceField field_;
+  const std::shared_ptr<const ClearanceField> field_;
   const double margin_;
   const std::vector<std::string> links_;  // of the ellipsoids
   const Eigen::Matrix3Xd middles_;        // of the ellipsoids, in the frames of their links [m]

@@ -9,9 +9,7 @@
 
 #include "../math/settings.hpp"
 #include "sidestep/attractor/clearance_barrier.hpp"
-#include "sidestep/attractor/clearance_table_barrier.hpp"
 #include "sidestep/attractor/joint_limit_barrier.hpp"
-#include "sidestep/attractor/self_collision_barrier.hpp"
 #include "sidestep/controller/motion.hpp"
 
 namespace sidestep {
@@ -21,37 +19,35 @@ constexpr double usable_acceleration =
     0.9;  // share of the limits for velocities, twists and trajectories: the rest is for feedback
 constexpr double default_look_period = 0.02;  // period of looks at places where there is no planner [s]
 
-/// Of joints whose torque may not hold the arm, as far as effort margins leave it; nothing without torque control.
-std::optional<HoldingTorque> make_holding(const Arm& arm, const ControllerSettings& settings, bool torque) {
-  if (!torque || !arm.has_dynamics()) {
-    return std::nullopt;
+/// All that must keep apart; what joints hold only of an arm moved by torque, as far as effort margins leave it.
+std::shared_ptr<const ClearanceItems> make_items(const Arm& arm, const ControllerSettings& settings, bool torque) {
+  std::optional<HoldingTorque> holding;
+  if (torque && arm.has_dynamics()) {
+    const Eigen::VectorXd effort = (1.0 - settings.effort_margin) * arm.robot().limits().effort;
+    holding.emplace(arm.dynamics(), effort, settings.barriers.self_activation);
   }
-  const Eigen::VectorXd effort = (1.0 - settings.effort_margin) * arm.robot().limits().effort;
-  HoldingTorque holding(arm.dynamics(), effort, settings.barriers.self_activation);
-  return holding.loads().empty() ? std::nullopt : std::optional(std::move(holding));
+  return std::make_shared<const ClearanceItems>(arm.robot(), arm.body(), arm.pairs(), std::vector<KeptPlane>{}, arm.tables(),
+                                                std::move(holding), settings.barriers.temperature);
 }
 
-std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b,
-                                                   const std::optional<HoldingTorque>& holding) {
-  const Robot& robot = arm.robot();
+std::shared_ptr<const GeometricSystem> make_system(const ClearanceItems& items, const BarrierSettings& b) {
+  const Robot& robot = items.robot();
   const int nv = robot.num_coordinates();
   std::vector<std::shared_ptr<const Embedding>> parts;
-  parts.push_back(std::make_shared<ClearanceBarrier>(
-      robot, arm.body(), BarrierFunction{b.activation, b.strength, b.power, b.floor}, b.temperature));
+  const auto add = [&](std::shared_ptr<const ClearanceGroup> group, const BarrierFunction& function) {
+    if (group && group->size() > 0) {
+      parts.push_back(std::make_shared<ClearanceBarrier>(robot, std::move(group), function));
+    }
+  };
+  add(items.obstacles(), {b.activation, b.strength, b.power, b.floor});
   if (robot.limits().lower.array().isFinite().any() || robot.limits().upper.array().isFinite().any()) {
     parts.push_back(std::make_shared<JointLimitBarrier>(
         robot, BarrierFunction{b.limit_activation, b.limit_strength, b.power, std::min(b.floor, 0.5 * b.limit_activation)}));
   }
   const BarrierFunction self{b.self_activation, b.self_strength, b.power, b.floor};
-  if (!arm.tables().empty()) {
-    parts.push_back(std::make_shared<ClearanceTableBarrier>(robot, arm.tables(), self));
-  }
-  if (!arm.pairs().empty()) {
-    parts.push_back(std::make_shared<SelfCollisionBarrier>(robot, arm.body(), arm.pairs(), self, b.temperature));
-  }
-  if (holding) {
-    parts.push_back(std::make_shared<HoldingTorqueBarrier>(*holding, self));
-  }
+  add(items.tables(), self);
+  add(items.pairs(), self);
+  add(items.holding(), self);
   GeometricSystemSettings settings;
   settings.stiffness = b.stiffness * Eigen::MatrixXd::Identity(nv, nv);
   settings.damping = b.damping * Eigen::MatrixXd::Identity(nv, nv);
@@ -120,9 +116,8 @@ ControllerModel::ControllerModel(Arm a, ControllerSettings s)
       settings(valid(std::move(s))),
       torque(use_torque(arm, settings.output)),
       dynamics(torque && arm.has_dynamics() ? std::optional(arm.dynamics()) : std::nullopt),
-      holding(make_holding(arm, settings, torque)),
-      system(make_system(arm, settings.barriers, holding)),
-      body(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables(), holding),
+      body(make_items(arm, settings, torque)),
+      system(make_system(body.items(), settings.barriers)),
       plausible(arm.robot(), body.reach()),
       joints(arm.robot()),
       usable{settings.speed * (1.0 - settings.limit_margin) * arm.robot().limits().velocity,

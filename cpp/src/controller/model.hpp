@@ -8,7 +8,6 @@
 #include "joint_kinds.hpp"
 #include "sidestep/attractor/geometric_system.hpp"
 #include "sidestep/clearance/body_clearance.hpp"
-#include "sidestep/clearance/holding_torque.hpp"
 #include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/arm/arm.hpp"
@@ -24,9 +23,8 @@ struct ControllerModel {
   const ControllerSettings settings;
   const bool torque;                                ///< it is what the arm is moved by
   const std::optional<RigidBodyDynamics> dynamics;  ///< with torque, where the arm has inertias
-  const std::optional<HoldingTorque> holding;
+  const BodyClearance body;                         ///< its items are those of the system's barriers
   const std::shared_ptr<const GeometricSystem> system;
-  const BodyClearance body;
   const Plausibility plausible;
   const JointKinds joints;
   const UsableLimits usable;

@@ -17,7 +17,7 @@ Sources::Sources(TripleBuffer<NumberedObstacles>& handed_over, const BodyClearan
       workspace_(body),
       settings_(settings),
       buffer_(handed_over),
-      closing_(robot, ellipsoids, settings.barriers.temperature, settings.safety.margin) {}
+      closing_(robot, ellipsoids, body.items().obstacles(), settings.safety.margin) {}
 
 bool Sources::update(const Eigen::VectorXd& q, double time) noexcept {
   if (buffer_.is_fresh()) {

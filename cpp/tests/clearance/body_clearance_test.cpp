@@ -7,7 +7,6 @@
 
 #include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/math/instruction_set.hpp"
-#include "sidestep/attractor/self_collision_barrier.hpp"
 #include "support/allocations.hpp"
 #include "support/every_instruction_set.hpp"
 #include "support/random_scene.hpp"
@@ -81,7 +80,7 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
       }
     };
     by_link(SelfCollisionBarrier(robot, body, pairs, f, cold), CoordinateLabel::Kind::self, false);
-    by_link(PlaneBarrier(robot, body, plane.point, plane.normal, plane.links, f, cold), CoordinateLabel::Kind::plane, false);
+    by_link(PlaneBarrier(robot, body, plane, f, cold), CoordinateLabel::Kind::plane, false);
     // The field's clearance of points outside is their distance.
     by_link(ClearanceBarrier(robot, body, f, cold), CoordinateLabel::Kind::obstacle, true);
     BOOST_TEST(std::abs(checked.nearest(q, obstacles, cap, w).clearance - found.minCoeff()) < 1e-12);  // rounding

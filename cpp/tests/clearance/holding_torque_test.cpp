@@ -2,7 +2,9 @@
 #include "sidestep/clearance/holding_torque.hpp"
 
 #include <boost/test/unit_test.hpp>
+#include <memory>
 
+#include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/clearance/body_clearance.hpp"
 #include "support/allocations.hpp"
 #include "support/random_scene.hpp"
@@ -76,8 +78,9 @@ BOOST_AUTO_TEST_CASE(only_loads_that_can_come_near_the_limit_count) {
   BOOST_TEST(
       HoldingTorque(dynamics, Eigen::VectorXd::Constant(nv, std::numeric_limits<double>::infinity()), 0.05).loads().empty());
   const BarrierFunction f{0.05, 0.02, 2.0, 0.002};
-  BOOST_CHECK_THROW(HoldingTorqueBarrier(HoldingTorque(dynamics, Eigen::VectorXd::Constant(nv, 1e5), 0.05), f),
-                    std::invalid_argument);
+  BOOST_CHECK_THROW(
+      ClearanceBarrier(robot, std::make_shared<HoldingTorque>(dynamics, Eigen::VectorXd::Constant(nv, 1e5), 0.05), f),
+      std::invalid_argument);
 }
 
 BOOST_AUTO_TEST_CASE(the_barrier_writes_what_it_holds_and_no_least_clearance) {
@@ -86,7 +89,7 @@ BOOST_AUTO_TEST_CASE(the_barrier_writes_what_it_holds_and_no_least_clearance) {
   const RigidBodyDynamics dynamics = random_dynamics(random, robot);
   const int nv = robot.num_coordinates();
   const HoldingTorque holding(dynamics, Eigen::VectorXd::Constant(nv, 0.5), 0.05);
-  const HoldingTorqueBarrier barrier(holding, {0.05, 0.02, 2.0, 0.002});
+  const ClearanceBarrier barrier(robot, std::make_shared<HoldingTorque>(holding), {0.05, 0.02, 2.0, 0.002});
   const Eigen::VectorXd q = random.vector(nv), v = random.vector(nv);
   const EmbeddingEvaluation found = evaluate(barrier, q, v, Obstacles::none());
   KinematicState state(robot);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "sidestep/clearance/stopping_clearance.hpp"
+#include "sidestep/clearance/clearance_group.hpp"
 #include "sidestep/attractor/barrier_function.hpp"
 #include "sidestep/attractor/embedding.hpp"
 
@@ -34,10 +34,7 @@ class Barrier : public Embedding {
   /// No activation distance is made shorter than this many floors of the barrier function.
   static constexpr double relaxed_floors = 2.0;
   /// No more of an activation distance is kept as a safety margin, of what is not seen.
-  static constexpr double margin_share = 0.5;
-  /// Two links that usually are nearer than this [m] have an activation distance of a share of what is usual: one that they cannot
-  /// leave would hold them to no purpose, as of a wrist whose parts pass 4 mm apart all the way round. No shorter than `least_usual`.
-  static constexpr double usually_near = 0.011, least_usual = 0.001;
+  static constexpr double margin_share = ClearanceGroup::margin_share;
 
  protected:
   /// Throws std::invalid_argument that names `owner`, the setting at fault, its value and what is allowed.
@@ -46,13 +43,6 @@ class Barrier : public Embedding {
   void set_num_coordinates(int num) { activations_.setConstant(num, function_.activation); }
   /// Makes the activation distance of a coordinate shorter than the barrier function's.
   void shorten_activation(int k, double most) { activations_[k] = std::min(activations_[k], most); }
-
-  /// For two links, by the median of their clearances over the whole range, if that is near.
-  void shorten_for_usual(int k, double median) {
-    if (median > 0.0 && median < usually_near) {
-      shorten_activation(k, std::max(relaxed_share * median, least_usual));
-    }
-  }
 
   /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
   Horizon horizon(const KinematicState& state) const noexcept {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sidestep/clearance/clearances.hpp"
+#include "sidestep/clearance/coordinate_label.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
 #include "sidestep/scene/obstacles.hpp"
 
@@ -22,23 +23,6 @@ struct EmbeddingView {
   /// Activation distances (m) in place of the embedding's own, see Barrier; empty: its own.
   Eigen::Map<const Eigen::VectorXd> activations{nullptr, 0};
   double horizon = 0.0;  ///< τ [s] at least by which obstacles that approach are looked for, see Horizon
-};
-
-/// What one coordinate of an embedding stands for. Fixed at construction, for messages and for what acts on clearances.
-struct CoordinateLabel {
-  enum class Kind {
-    potential,    ///< no clearance: a density, a sum
-    obstacle,     ///< a link's ellipsoid against the obstacle points
-    self,         ///< two links of the robot
-    plane,        ///< a link against a plane
-    joint_limit,  ///< a joint against a position limit; the clearance is in the joint's unit
-    effort,       ///< what a joint holds of the arm against its effort limit, see HoldingTorqueBarrier
-  };
-  Kind kind = Kind::potential;
-  std::string name = {};                                    ///< of the link, or of the coordinate for limits
-  std::string other = {};                                   ///< the second link of a pair; "lower" or "upper" for a joint limit
-  double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
-  bool slides = false;                                      ///< a limit of a sliding joint: the clearance is in m, not in rad
 };
 
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).

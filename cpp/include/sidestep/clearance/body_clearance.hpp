@@ -3,52 +3,18 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
-#include <limits>
+#include <memory>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "sidestep/body/body.hpp"
-#include "sidestep/attractor/embedding.hpp"
-#include "sidestep/body/body_ellipsoid.hpp"
-#include "sidestep/clearance/clearance_table.hpp"
-#include "sidestep/clearance/holding_torque.hpp"
-#include "sidestep/body/link_pair.hpp"
-#include "sidestep/clearance/ball_cover.hpp"
+#include "sidestep/clearance/clearance_items.hpp"
 #include "sidestep/clearance/distance_field.hpp"
+#include "sidestep/clearance/margins.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
-
-/// A plane that links must not cross: `normal` points to the free side, in the world.
-struct KeptPlane {
-  Eigen::Vector3d point;
-  Eigen::Vector3d normal;
-  std::vector<std::string> links;
-};
-
-/// How far every item (see BodyClearance) must keep off at a configuration.
-///
-/// The margin is asked for at every configuration that is looked at, margin − slack is kept everywhere between them.
-/// Near an end of the motion where an item is nearer than the margin, by the deficit δ, it may be as near:
-///
-///     margin(q) = margin − max over ends of δ_end · max(0, 1 − motion(q − q_end) / fade),
-///
-/// with motion() the bound of how far the item moves, see BodyClearance::motions().
-struct Margins {
-  struct End {
-    Eigen::VectorXd q;         ///< (nv)
-    Eigen::VectorXd deficits;  ///< δ of every item [m], zero where the margin holds
-  };
-
-  double margin = 0.02;       ///< [m]
-  double slack = 0.002;       ///< [m], positive: smaller costs more
-  double fade = 0.3;          ///< [m], positive
-  std::vector<End> ends;      ///< those with a deficit
-  double pair_margin = 0.02;  ///< of two links at most [m]: neighbours are never far apart
-};
 
 /// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no
 /// derivative.
@@ -69,18 +35,19 @@ struct Margins {
 /// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
-  /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier; `holding`:
-  /// configurations that the arm cannot rest in are not free. Throws
-  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown,
-  /// or a prismatic joint has no limits.
+  explicit BodyClearance(std::shared_ptr<const ClearanceItems> items);
+  /// Of items of its own, see ClearanceItems.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
-                std::optional<HoldingTorque> holding = std::nullopt);
+                std::optional<HoldingTorque> holding = std::nullopt)
+      : BodyClearance(std::make_shared<const ClearanceItems>(std::move(robot), body, pairs, planes, std::move(tables),
+                                                             std::move(holding))) {}
 
-  const Robot& robot() const noexcept { return robot_; }
-  int num_items() const noexcept { return static_cast<int>(items_.size()); }
+  const Robot& robot() const noexcept { return items_->robot(); }
+  const ClearanceItems& items() const noexcept { return *items_; }
+  int num_items() const noexcept { return items_->size(); }
   /// What an item is: kind, link, and the other link.
-  const CoordinateLabel& label(int item) const noexcept { return items_[static_cast<std::size_t>(item)].label; }
+  const CoordinateLabel& label(int item) const noexcept { return (*items_)[item].label; }
 
   /// What changes in a query; one per thread.
   class Workspace {
@@ -150,21 +117,15 @@ class BodyClearance {
   /// around the links; infinity where all are at rest.
   double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept;
 
-  /// Whether an item is of the arm alone, and known: no sensor's error is in it.
-  bool is_own(int item) const noexcept {
-    const CoordinateLabel::Kind kind = label(item).kind;
-    return kind == CoordinateLabel::Kind::self || kind == CoordinateLabel::Kind::effort;
-  }
-
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
-    return is_own(item) ? std::min({margins.pair_margin, margins.margin, items_[static_cast<std::size_t>(item)].most_margin})
-                        : margins.margin;
+    const ClearanceItem& of = (*items_)[item];
+    return of.is_own() ? std::min({margins.pair_margin, margins.margin, of.most_margin}) : margins.margin;
   }
 
   /// What `margins` give an item between the configurations that are looked at [m].
   double slack(int item, const Margins& margins) const noexcept {
-    return std::min(margins.slack, 0.5 * items_[static_cast<std::size_t>(item)].most_margin);
+    return std::min(margins.slack, 0.5 * (*items_)[item].most_margin);
   }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
@@ -176,65 +137,25 @@ class BodyClearance {
 
   /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
   double motion(int item, ConstVectorRef displacement) const noexcept {
-    return items_[static_cast<std::size_t>(item)].reach.dot(displacement.cwiseAbs());
+    return (*items_)[item].reach.dot(displacement.cwiseAbs());
   }
 
   /// The same from q on, by the smaller of the two bounds.
   double motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept;
 
   /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
-  const Eigen::VectorXd& reach() const noexcept { return reach_; }
+  const Eigen::VectorXd& reach() const noexcept { return items_->reach(); }
 
  private:
-  struct Ellipsoid {
-    Eigen::Vector3d mean;
-    Eigen::Matrix3d axes_T;   // rotates into the principal axes, of the joint's child
-    Eigen::Vector3d squares;  // of the semi-axes, ascending
-    Eigen::Matrix3d shape;
-    double extent;
-    std::vector<CoverBall> cover;
-  };
-  struct Link {
-    std::string name;
-    int joint;
-    std::vector<Ellipsoid> ellipsoids;
-    Eigen::Vector3d centre;  // of a ball around them
-    double radius;
-  };
-  struct Item {
-    Item(CoordinateLabel what, int on, Eigen::Index nv)
-        : label(std::move(what)), link(on), reach(Eigen::VectorXd::Zero(nv)), bend(Eigen::MatrixXd::Zero(nv, nv)) {}
-
-    CoordinateLabel label;
-    int link, other = -1;   // links_; other: of a pair; both -1 for a table and a load
-    int plane = -1;         // planes_
-    int table = -1;         // tables_
-    int load = -1;          // of holding_
-    int base = -1;          // joint that moves both of a pair alike
-    Eigen::VectorXd reach;  // R of every coordinate
-    Eigen::MatrixXd bend;   // R of the later one of two, row by row in bends_
-    double contact = 0.0;   // of a pair [m]
-
-    /// Of links that are usually near, and of loads, see Barrier [m].
-    double most_margin = std::numeric_limits<double>::infinity();
-  };
-  struct Plane {
-    Eigen::Vector3d normal;
-    double offset;
-  };
   struct Found {
     double clearance;
     int point;
   };
 
-  std::size_t words() const noexcept { return (items_.size() + 63) / 64; }
-  int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
-  void add_reach(Item& item, const Link& link) const;
-  void add_tables();
-  void add_loads();
+  std::size_t words() const noexcept { return (static_cast<std::size_t>(items_->size()) + 63) / 64; }
   void place(ConstVectorRef q, Workspace& w) const noexcept;
   void move(ConstVectorRef velocity, Workspace& w) const noexcept;
-  double speed(const Item& item, Workspace& w) const noexcept;
+  double speed(const ClearanceItem& item, Workspace& w) const noexcept;
   const KinematicState& state(Workspace& w) const noexcept;
   void bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
@@ -242,20 +163,13 @@ class BodyClearance {
   struct Asked {
     double cap, near, stop;
   };
-  Found look(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  Found look_at_points(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  double look_at_pair(const Item& item, const Asked& asked, const Workspace& w) const noexcept;
-  double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
+  Found look(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  Found look_at_points(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  double look_at_pair(const ClearanceItem& item, const Asked& asked, const Workspace& w) const noexcept;
+  double look_at_plane(const ClearanceItem& item, double cap, const Workspace& w) const noexcept;
   double margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept;
 
-  Robot robot_;
-  std::vector<Link> links_;
-  std::vector<Plane> planes_;
-  std::vector<ClearanceTable> tables_;
-  std::optional<HoldingTorque> holding_;
-  std::vector<Item> items_;
-  Eigen::VectorXd reach_;
-  Eigen::MatrixXd reaches_, bends_;  // of all items: (items × nv), (items × nv²)
+  std::shared_ptr<const ClearanceItems> items_;
   struct Rotation {
     Eigen::Matrix3d fixed, cosine, sine;  // as in KinematicState
   };

@@ -50,4 +50,7 @@ class BoltzmannMean {
   WrenchPair g0_, g1_;  // gradients of s0 and s1
 };
 
+/// The temperature [m] itself. Throws std::invalid_argument, which `owner` begins, unless it is positive and finite.
+double checked_temperature(double temperature, const char* owner);
+
 }  // namespace sidestep

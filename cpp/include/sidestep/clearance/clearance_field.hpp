@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/clearance/stopping_clearance.hpp"
 #include "sidestep/body/body_ellipsoid.hpp"
-#include "sidestep/clearance/clearances.hpp"
+#include "sidestep/clearance/clearance_group.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
 #include "sidestep/scene/obstacles.hpp"
 
@@ -30,7 +30,7 @@ namespace sidestep {
 /// − √(nᵀ S n); and points by the same plane of their own, with a direction and so a rate that is known as well as n
 /// is. All this is done in single precision, many side by side. What is left is summed in double precision, with the
 /// widest registers of the machine.
-class ClearanceField {
+class ClearanceField final : public ClearanceGroup {
  public:
   /// Points that are farther than the nearest by `window` temperatures do not count: each would weigh less than
   /// e^−window and change the mean by window e^−window T at most, 2e-7 m at 12 and 2 mm, far below what a sensor sees.
@@ -44,16 +44,18 @@ class ClearanceField {
   /// temperature [m] is not positive and finite, or the window not within 1 to 600.
   ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002, double window = default_window);
 
-  int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
+  int size() const noexcept override { return static_cast<int>(ellipsoids_.size()); }
+  CoordinateLabel label(int k) const override;
 
   /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches:
   /// of points of which the room after a stop is below that of the horizon, wherever they are. No allocation.
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
-                ClearanceView out) const noexcept;
+                ClearanceView out) const noexcept override;
 
   /// Whether a ball inside an ellipsoid, as large as its shortest semi-axis allows, reaches deeper than `depth` [m]
   /// into that of a point. No allocation.
-  bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept;
+  bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept override;
+  bool is_seen() const noexcept override { return true; }
 
   /// Which component of the body ellipsoid k came from.
   int component(int k) const noexcept { return ellipsoids_[static_cast<std::size_t>(k)].body.component; }
@@ -77,6 +79,7 @@ class ClearanceField {
   };
 
   double temperature_, window_;
+  std::vector<std::string> links_;     // of the body's components
   std::vector<Ellipsoid> ellipsoids_;  // those of one joint stand together
   std::vector<Cluster> clusters_;
 };

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <vector>
 
-#include "sidestep/attractor/barrier.hpp"
+#include "sidestep/clearance/clearance_group.hpp"
 #include "sidestep/robot/dynamics.hpp"
 
 namespace sidestep {
@@ -13,8 +12,9 @@ namespace sidestep {
 ///     h_j(q) = (effort_j − |g_j(q)|) / weight_j  [m],
 ///
 /// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a sliding joint it is a share of
-/// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below.
-class HoldingTorque {
+/// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below. It is no clearance from
+/// anything, so that Clearances::least says nothing of it.
+class HoldingTorque final : public ClearanceGroup {
  public:
   /// Of the joints that may come nearer to their limit than an activation distance of `most` [m] in any configuration; of the others
   /// none can. `effort` (nv) [Nm | N] may be infinite.
@@ -35,7 +35,12 @@ class HoldingTorque {
     std::vector<Carrier> carriers;
   };
   const std::vector<Load>& loads() const noexcept { return loads_; }
-  const Robot& robot() const noexcept { return robot_; }
+
+  int size() const noexcept override { return static_cast<int>(loads_.size()); }
+  CoordinateLabel label(int k) const override;
+  void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
+                ClearanceView out) const noexcept override;
+  double longest_activation(int k) const noexcept override { return loads_[static_cast<std::size_t>(k)].activation; }
 
   /// h [m]; its gradient into `gradient` (nv), its rate and its curvature at q̈ = 0. No allocation.
   struct Room {
@@ -50,20 +55,6 @@ class HoldingTorque {
   std::vector<Inertial> inertials_;
   Eigen::Vector3d gravity_;
   std::vector<Load> loads_;
-};
-
-/// One coordinate per load of HoldingTorque, a barrier of its room: the motion bends before it comes to where the arm would sink.
-/// It is no clearance from anything, so that Clearances::least says nothing of it.
-class HoldingTorqueBarrier final : public Barrier {
- public:
-  /// Throws std::invalid_argument that names the setting, or if there is no load.
-  HoldingTorqueBarrier(HoldingTorque holding, BarrierFunction barrier);
-
-  void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
-  CoordinateLabel label(int k) const override;
-
- private:
-  HoldingTorque holding_;
 };
 
 }  // namespace sidestep

@@ -1,5 +1,5 @@
 // Means over the gaps of some pairs of ellipsoids, against those over all.
-#include "sidestep/attractor/self_collision_barrier.hpp"
+#include "sidestep/attractor/clearance_barrier.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>

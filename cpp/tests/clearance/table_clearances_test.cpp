@@ -1,4 +1,4 @@
-#include "sidestep/attractor/clearance_table_barrier.hpp"
+#include "sidestep/attractor/clearance_barrier.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>

@@ -1,8 +1,9 @@
-#include "sidestep/attractor/clearance_table_barrier.hpp"
+#include "sidestep/clearance/table_clearances.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace sidestep {
@@ -19,31 +20,21 @@ struct Tangent {
 
 }  // namespace
 
-ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, BarrierFunction barrier,
-                                             double reach)
-    : Barrier(robot, barrier, "clearance table barrier"),
-      reach_(std::max(reach, barrier.activation)),
-      tables_(std::move(tables)) {
-  if (!std::isfinite(reach)) {
-    throw std::invalid_argument("clearance table barrier: reach is " + std::to_string(reach) + " m, must be finite");
-  }
+TableClearances::TableClearances(const Robot& robot, std::vector<ClearanceTable> tables, const char* owner)
+    : tables_(std::move(tables)) {
   if (tables_.empty()) {
-    throw std::invalid_argument("clearance table barrier: there is no table");
+    throw std::invalid_argument(std::string(owner) + ": there is no table");
   }
   for (const ClearanceTable& table : tables_) {
     robot.frame_index(table.first), robot.frame_index(table.second);
     table.validate(robot.num_coordinates());
     steepest_.push_back(table.steepest());
-  }
-  set_num_coordinates(static_cast<int>(tables_.size()));
-  for (std::size_t i = 0; i < tables_.size(); ++i) {
-    shorten_for_usual(static_cast<int>(i), tables_[i].median());
+    activations_.push_back(activation_for_usual(table.median()));
   }
 }
 
-void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& state,
-                                   const Obstacles& /*obstacles*/) const noexcept {
-  const Horizon ahead = horizon(state);
+void TableClearances::evaluate(const KinematicState& state, const Obstacles& /*obstacles*/, double reach, const Horizon& ahead,
+                               ClearanceView out) const noexcept {
   for (std::size_t i = 0; i < tables_.size(); ++i) {
     const ClearanceTable& table = tables_[i];
     const int x = table.axes[0].coordinate, y = table.axes[1].coordinate;
@@ -67,7 +58,7 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
         }
       }
     }
-    if (!(here.value < reach_) && !(minded.value + ahead.time * minded.rate < ahead.distance)) {
+    if (!(here.value < reach) && !(minded.value + ahead.time * minded.rate < ahead.distance)) {
       continue;
     }
     const auto write = [k = static_cast<Eigen::Index>(i), x, y](const Tangent& of, ClearanceStateView& to) {
@@ -78,18 +69,17 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
       to.gradients(x, k) = of.gradient.x();
       to.gradients(y, k) = of.gradient.y();
     };
-    write(here, out.clearances);
+    write(here, out);
     minded.curvature = std::max(minded.curvature, 0.0);  // see the header
-    write(minded, out.clearances.approach);
-    out.clearances.nearest[static_cast<Eigen::Index>(i)] = 0;
-    out.clearances.least[static_cast<Eigen::Index>(i)] = here.value;
+    write(minded, out.approach);
+    out.nearest[static_cast<Eigen::Index>(i)] = 0;
+    out.least[static_cast<Eigen::Index>(i)] = here.value;
   }
-  add_barriers(out);
 }
 
-CoordinateLabel ClearanceTableBarrier::label(int k) const {
+CoordinateLabel TableClearances::label(int k) const {
   const ClearanceTable& table = tables_[static_cast<std::size_t>(k)];
-  return {CoordinateLabel::Kind::self, table.first, table.second, floor(k)};
+  return {CoordinateLabel::Kind::self, table.first, table.second};
 }
 
 }  // namespace sidestep

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "sidestep/body/body.hpp"
+#include "sidestep/body/link_pair.hpp"
+#include "sidestep/clearance/clearance_field.hpp"
+#include "sidestep/clearance/coordinate_label.hpp"
+#include "sidestep/clearance/holding_torque.hpp"
+#include "sidestep/clearance/link_ellipsoids.hpp"
+#include "sidestep/clearance/pair_clearances.hpp"
+#include "sidestep/clearance/plane_clearances.hpp"
+#include "sidestep/clearance/table_clearances.hpp"
+#include "sidestep/robot/robot.hpp"
+
+namespace sidestep {
+
+/// What must keep apart: a link and the obstacles, two links, a link and a plane, what a joint holds and its effort limit.
+struct ClearanceItem {
+  enum class Source { obstacles, pair, plane, table, load };
+
+  ClearanceItem(Source from, int number, CoordinateLabel what, Eigen::Index nv);
+
+  Source source;
+  int index;  ///< of the pair, plane, table or load; of an obstacles' item, the link
+  CoordinateLabel label;
+  int link = -1, other = -1;  ///< of BodyLinks; other: of a pair; both -1 for a table and a load
+  int base = -1;              ///< joint that moves both of a pair alike
+  double contact = 0.0;       ///< of a pair [m]
+
+  /// R of every coordinate: the farthest that a point of the item moves, relative to what it keeps off, for a unit of it
+  /// (nv) [m/rad | 1]; of a table and a load the steepest slopes.
+  Eigen::VectorXd reach;
+  /// R of the later one of two coordinates (nv × nv) [m/rad²].
+  Eigen::MatrixXd bend;
+  /// Largest margin that is kept: of links that are usually near, and of loads, see ClearanceGroup [m].
+  double most_margin = std::numeric_limits<double>::infinity();
+
+  /// Whether it is of the arm alone, and known: no sensor's error is in it.
+  bool is_own() const noexcept {
+    return label.kind == CoordinateLabel::Kind::self || label.kind == CoordinateLabel::Kind::effort;
+  }
+};
+
+/// All that must keep apart of an arm, made once: the list for searches, and the groups for derivatives, over the same links.
+///
+/// Barriers, planner, look along a motion and stop share it. Obstacles' items come first, then pairs, planes, tables and loads.
+class ClearanceItems {
+ public:
+  /// `temperature` [m] of the means that have derivatives. Throws std::invalid_argument if the body is not calibrated or no
+  /// joint moves it, a pair, plane or table is at fault, a name is unknown, or a prismatic joint has no limits.
+  ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
+                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
+                 std::optional<HoldingTorque> holding = std::nullopt, double temperature = PairClearances::default_temperature);
+
+  const Robot& robot() const noexcept { return robot_; }
+  const BodyLinks& links() const noexcept { return *links_; }
+
+  int size() const noexcept { return static_cast<int>(items_.size()); }
+  const ClearanceItem& operator[](int i) const noexcept { return items_[static_cast<std::size_t>(i)]; }
+
+  // Groups of clearances; null where there are none.
+  const std::shared_ptr<const ClearanceField>& obstacles() const noexcept { return obstacles_; }
+  const std::shared_ptr<const PairClearances>& pairs() const noexcept { return pairs_; }
+  const std::vector<std::shared_ptr<const PlaneClearances>>& planes() const noexcept { return planes_; }
+  const std::shared_ptr<const TableClearances>& tables() const noexcept { return tables_; }
+  const std::shared_ptr<const HoldingTorque>& holding() const noexcept { return holding_; }
+
+  /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
+  const Eigen::VectorXd& reach() const noexcept { return reach_; }
+  /// Of all items: (items × nv), (items × nv²), the latter row by row.
+  const Eigen::MatrixXd& reaches() const noexcept { return reaches_; }
+  const Eigen::MatrixXd& bends() const noexcept { return bends_; }
+
+ private:
+  void add_obstacles();
+  void add_pairs();
+  void add_planes();
+  void add_tables();
+  void add_loads();
+  void add_reach(ClearanceItem& item, const LinkEllipsoids& link) const;
+  void stack_bounds();
+
+  Robot robot_;
+  std::shared_ptr<const BodyLinks> links_;
+  std::shared_ptr<const ClearanceField> obstacles_;
+  std::shared_ptr<const PairClearances> pairs_;
+  std::vector<std::shared_ptr<const PlaneClearances>> planes_;
+  std::shared_ptr<const TableClearances> tables_;
+  std::shared_ptr<const HoldingTorque> holding_;
+  std::vector<ClearanceItem> items_;
+  Eigen::VectorXd reach_;
+  Eigen::MatrixXd reaches_, bends_;
+};
+
+}  // namespace sidestep

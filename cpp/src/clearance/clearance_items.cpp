@@ -1,0 +1,180 @@
+#include "sidestep/clearance/clearance_items.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+using Source = ClearanceItem::Source;
+
+constexpr const char* items_owner = "body clearance";
+constexpr double most_activation =
+    0.05;  // [m] that a margin of a pair is a share of: longer than of links that are usually near
+
+double across(const Eigen::Vector3d& offset, const Eigen::Vector3d& axis) { return offset.cross(axis).norm(); }
+
+double most_margin_of(const ClearanceGroup& group, int k) {
+  return ClearanceGroup::margin_share * std::min(most_activation, group.longest_activation(k));
+}
+
+/// The last joint above both, -1: none. Parents have smaller indices.
+int joint_above(const Robot& robot, int i, int j) {
+  while (i != j) {
+    int& later = i > j ? i : j;
+    later = robot.joints()[static_cast<std::size_t>(later)].parent;
+  }
+  return i;
+}
+
+}  // namespace
+
+ClearanceItem::ClearanceItem(Source from, int number, CoordinateLabel what, Eigen::Index nv)
+    : source(from),
+      index(number),
+      label(std::move(what)),
+      reach(Eigen::VectorXd::Zero(nv)),
+      bend(Eigen::MatrixXd::Zero(nv, nv)) {}
+
+ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
+                               const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables,
+                               std::optional<HoldingTorque> holding, double temperature)
+    : robot_(std::move(robot)),
+      links_(std::make_shared<BodyLinks>(robot_, body, items_owner)),
+      obstacles_(std::make_shared<ClearanceField>(robot_, body, temperature)) {
+  if (!pairs.empty()) {
+    pairs_ = std::make_shared<PairClearances>(robot_, links_, pairs, temperature, items_owner);
+  }
+  for (const KeptPlane& plane : planes) {
+    planes_.push_back(std::make_shared<PlaneClearances>(robot_, links_, plane, temperature, items_owner));
+  }
+  if (!tables.empty()) {
+    tables_ = std::make_shared<TableClearances>(robot_, std::move(tables), items_owner);
+  }
+  if (holding) {
+    holding_ = std::make_shared<HoldingTorque>(*std::move(holding));
+  }
+  add_obstacles();
+  add_pairs();
+  add_planes();
+  add_tables();
+  add_loads();
+  stack_bounds();
+}
+
+void ClearanceItems::add_obstacles() {
+  for (int link = 0; link < links_->size(); ++link) {
+    const LinkEllipsoids& ellipsoids = (*links_)[link];
+    if (ellipsoids.joint >= 0) {
+      items_.emplace_back(Source::obstacles, link, CoordinateLabel{CoordinateLabel::Kind::obstacle, ellipsoids.name},
+                          robot_.num_coordinates());
+      items_.back().link = link;
+      add_reach(items_.back(), ellipsoids);
+    }
+  }
+}
+
+void ClearanceItems::add_pairs() {
+  for (int k = 0; pairs_ && k < pairs_->size(); ++k) {
+    const PairClearances::Pair& links = (*pairs_)[k];
+    ClearanceItem& pair = items_.emplace_back(Source::pair, k, pairs_->label(k), robot_.num_coordinates());
+    pair.contact = links.contact;
+    pair.link = links.first;
+    pair.other = links.second;
+    const LinkEllipsoids &first = (*links_)[links.first], &second = (*links_)[links.second];
+    pair.base = joint_above(robot_, first.joint, second.joint);  // what is above it moves both alike
+    add_reach(pair, first);
+    add_reach(pair, second);
+    pair.most_margin = most_margin_of(*pairs_, k);
+  }
+}
+
+void ClearanceItems::add_planes() {
+  for (int n = 0; n < static_cast<int>(planes_.size()); ++n) {
+    const PlaneClearances& plane = *planes_[static_cast<std::size_t>(n)];
+    for (int k = 0; k < plane.size(); ++k) {
+      items_.emplace_back(Source::plane, n, plane.label(k), robot_.num_coordinates());
+      items_.back().link = plane.link(k);
+      add_reach(items_.back(), (*links_)[plane.link(k)]);
+    }
+  }
+}
+
+void ClearanceItems::add_reach(ClearanceItem& item, const LinkEllipsoids& link) const {
+  // Up the chain, with a ball around the origin below that holds the link in every configuration.
+  double ball = 0.0;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // of that origin, from joint j
+  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
+  for (int j = link.joint; j != item.base;) {
+    const Joint& joint = robot_.joints()[static_cast<std::size_t>(j)];
+    double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
+    if (j == link.joint) {
+      for (const LinkEllipsoid& e : link.ellipsoids) {
+        radius = std::max(radius, across(e.mean, joint.axis) + e.extent);
+        next = std::max(next, e.mean.norm() + e.extent);
+      }
+    } else {
+      radius = across(offset, joint.axis) + ball;
+      next = offset.norm() + ball;
+    }
+    const bool turns = joint.type == JointType::revolute;
+    const double factor = std::abs(joint.multiplier), R = factor * (turns ? radius : 1.0);
+    item.reach[joint.coordinate] += R;
+    later[joint.coordinate] += R;
+    if (turns) {
+      // All later ones turn with it, and the pairs (i, j) and (j, i) count alike; itself once.
+      item.bend.row(joint.coordinate) += 2.0 * factor * later.transpose();
+      item.bend(joint.coordinate, joint.coordinate) -= factor * R;
+    } else {
+      const JointLimits& limits = robot_.limits();
+      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
+      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
+      next += std::max(std::abs(low), std::abs(high));
+    }
+    ball = next;
+    offset = joint.X_PJ.translation();
+    j = joint.parent;
+  }
+}
+
+void ClearanceItems::add_tables() {
+  for (int k = 0; tables_ && k < tables_->size(); ++k) {
+    const ClearanceTable& table = (*tables_)[k];
+    ClearanceItem& item = items_.emplace_back(Source::table, k, tables_->label(k), robot_.num_coordinates());
+    const Eigen::Vector2d steepest = table.steepest();
+    item.reach[table.axes[0].coordinate] = steepest[0];
+    item.reach[table.axes[1].coordinate] = steepest[1];
+    item.most_margin = most_margin_of(*tables_, k);
+  }
+}
+
+void ClearanceItems::add_loads() {
+  for (int k = 0; holding_ && k < holding_->size(); ++k) {
+    const HoldingTorque::Load& load = holding_->loads()[static_cast<std::size_t>(k)];
+    ClearanceItem& item = items_.emplace_back(Source::load, k, holding_->label(k), robot_.num_coordinates());
+    item.reach = load.steepest;
+    item.bend = load.bend;
+    item.most_margin = ClearanceGroup::margin_share * load.activation;
+  }
+}
+
+void ClearanceItems::stack_bounds() {
+  const Eigen::Index nv = robot_.num_coordinates();
+  reach_ = Eigen::VectorXd::Zero(nv);
+  reaches_.resize(size(), nv);
+  bends_.resize(size(), nv * nv);
+  for (Eigen::Index k = 0; const ClearanceItem& i : items_) {
+    reaches_.row(k) = i.reach.transpose();
+    bends_.row(k++) = i.bend.transpose().reshaped().transpose();
+    if (!i.reach.allFinite()) {
+      throw std::invalid_argument(std::string(items_owner) + ": a prismatic joint above link '" + i.label.name +
+                                  "' has no position limits, so that no edge could be proven free");
+    }
+    reach_ = reach_.cwiseMax(i.reach);
+  }
+}
+
+}  // namespace sidestep
