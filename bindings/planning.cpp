@@ -146,16 +146,14 @@ void bind_guide(nb::module_& m) {
              double patience, double retry, double tolerance, double duration, std::uint64_t seed, bool synchronous) {
             check_fitted_to(robot, body);
             OnlinePlannerConfig s;
-            s.planner = planner.value_or(s.planner);
-            s.route = route.value_or(s.route);
-            s.period = period, s.patience = patience, s.retry = retry, s.tolerance = tolerance;
-            s.duration = duration, s.seed = seed, s.synchronous = synchronous;
+            s.planner = {planner.value_or(PlannerSettings{}), route.value_or(TimedPathSettings{}), period, patience, retry};
+            s.tolerance = tolerance, s.duration = duration, s.seed = seed, s.synchronous = synchronous;
             new (self) OnlinePlanner(BodyClearance(robot, body, link_pairs(pairs), {}, std::move(tables)), s);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
           nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("planner") = nb::none(),
-          nb::arg("route") = nb::none(), nb::arg("period") = OnlinePlannerConfig{}.period,
-          nb::arg("patience") = OnlinePlannerConfig{}.patience, nb::arg("retry") = OnlinePlannerConfig{}.retry,
+          nb::arg("route") = nb::none(), nb::arg("period") = OnlinePlannerSettings{}.period,
+          nb::arg("patience") = OnlinePlannerSettings{}.patience, nb::arg("retry") = OnlinePlannerSettings{}.retry,
           nb::arg("tolerance") = OnlinePlannerConfig{}.tolerance, nb::arg("duration") = OnlinePlannerConfig{}.duration,
           nb::arg("seed") = OnlinePlannerConfig{}.seed, nb::arg("synchronous") = OnlinePlannerConfig{}.synchronous)
       .def(
@@ -195,7 +193,7 @@ void bind_guide(nb::module_& m) {
           "speed, by balls around the links.")
       .def_prop_ro("plan", &OnlinePlanner::last_plan, "What the last search found.")
       .def_prop_ro("searches", [](const OnlinePlanner& g) { return g.counts().searches; }, "How often it searched.")
-      .def_prop_ro("period", [](const OnlinePlanner& g) { return g.settings().period; }, "[s] between two looks at the scene.");
+      .def_prop_ro("period", [](const OnlinePlanner& g) { return g.settings().planner.period; }, "[s] between two looks at the scene.");
 }
 
 }  // namespace

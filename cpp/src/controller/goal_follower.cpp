@@ -23,13 +23,9 @@ std::unique_ptr<OnlinePlanner> make_planner(const BodyClearance& body, const Con
     return nullptr;
   }
   OnlinePlannerConfig config;
-  config.planner = settings.planner->search;
-  config.route = settings.planner->route;
-  config.route.speed = settings.speed;
+  config.planner = *settings.planner;
+  config.planner.route.speed = settings.speed;
   config.safety = settings.safety;
-  config.period = settings.planner->period;
-  config.patience = settings.planner->patience;
-  config.retry = settings.planner->retry;
   config.seed = settings.seed;
   if (dynamics) {
     config.dynamics.emplace(*dynamics);

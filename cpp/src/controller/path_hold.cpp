@@ -30,7 +30,7 @@ LookAhead::Leader leader_along(const ControllerSettings& settings, const OnlineP
   if (route == nullptr) {
     return {};
   }
-  return [&settings, route, follower = following.follower, route_settings = planner.settings().route](
+  return [&settings, route, follower = following.follower, route_settings = planner.settings().planner.route](
              const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal) mutable {
     JointGoal& reference = std::get<JointGoal>(goal);
     follower.advance(*route, route_settings, q, duration, reference.position, reference.velocity, reference.acceleration);

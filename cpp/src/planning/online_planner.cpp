@@ -29,13 +29,24 @@ const char* name(OnlinePlannerStatus status) noexcept {
   return "unknown";
 }
 
+template <>
+const std::vector<Field<OnlinePlannerSettings>>& fields() {
+  using S = OnlinePlannerSettings;
+  static const std::vector<Field<S>> all{
+      {"period", &S::period, "s", 0.001, 10.0, "between two looks of the planner at the scene: shorter reacts earlier"},
+      {"patience", &S::patience, "s", 0.05, 60.0, "without progress until another path is looked for"},
+      {"retry", &S::retry, "s", 0.05, 600.0, "until a failed search is repeated in the same scene"},
+  };
+  return all;
+}
+
 void OnlinePlannerConfig::validate() const {
-  planner.validate();
-  route.validate();
+  planner.search.validate();
+  planner.route.validate();
   const auto positive = [](double value, const char* what) { require(value > 0.0, what, value, "positive"); };
-  positive(period, "online planner: period");
-  positive(patience, "online planner: patience");
-  positive(retry, "online planner: retry");
+  positive(planner.period, "online planner: period");
+  positive(planner.patience, "online planner: patience");
+  positive(planner.retry, "online planner: retry");
   positive(tolerance, "online planner: tolerance");
   positive(duration, "online planner: duration");
 }
@@ -46,16 +57,16 @@ OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& sett
       goal_(Eigen::VectorXd::Zero(body_.robot().num_coordinates())),
       last_q_(goal_),
       velocity_(goal_),
-      progress_(settings.patience),
+      progress_(settings.planner.patience),
       here_(body_),
       states_(State{goal_, goal_, goal_}),
       answers_(Answer{}),
       looked_(Looked{}),
       newest_(std::make_shared<const Obstacles>(Obstacles::none())),
-      planner_(body_, settings.planner),
+      planner_(body_, settings.planner.search),
       obstacles_(newest_),
       watch_(body_),
-      margin_(settings.planner.margin) {
+      margin_(settings.planner.search.margin) {
   if (settings_.works && !settings_.synchronous) {
     planner_.interrupt_when([this] {
       newer_ = states_.update() || newer_;
@@ -139,7 +150,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     state.written = std::chrono::steady_clock::now();
     states_.submit();
     if (settings_.synchronous) {
-      next_look_ = time + settings_.period;
+      next_look_ = time + settings_.planner.period;
       look_safely(states_.get());
     } else if (first) {
       wake_.release();
@@ -161,11 +172,11 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
       follower_.enter(*answer.route, q, velocity_);
     }
     reference.position.resize(goal_.size());
-    follower_.advance(*answer.route, settings_.route, q, time - last_time_, reference.position, reference.velocity,
+    follower_.advance(*answer.route, settings_.planner.route, q, time - last_time_, reference.position, reference.velocity,
                       reference.acceleration);
-    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.route, reference.places); num > 0) {
+    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.planner.route, reference.places); num > 0) {
       reference.num_places = num;
-      reference.arrives = answer.route->length() - follower_.station <= settings_.route.lead;
+      reference.arrives = answer.route->length() - follower_.station <= settings_.planner.route.lead;
     }
   } else {
     reference.position = goal_;

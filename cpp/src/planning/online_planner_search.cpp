@@ -18,7 +18,7 @@ constexpr double back = 0.05;           // between places behind the reference w
 
 void OnlinePlanner::run() {
   while (!stopping_.load()) {
-    static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
+    static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.planner.period)));
     if ((states_.update() || newer_) && !stopping_.load()) {
       newer_ = false;
       const State state = states_.get();  // a copy: newer ones come while it looks
@@ -57,13 +57,13 @@ void OnlinePlanner::look(const State& state) {
     seen_goal_ = state.goal_number;
     seen_stops_ = state.stops;
     have_path_ = direct_ = failed_ = false;
-    margin_ = settings_.planner.margin;
+    margin_ = settings_.planner.search.margin;
   }
   bool stuck = false;
   if (state.stops != seen_stops_) {
     seen_stops_ = state.stops;
     stuck = true;
-    margin_ = settings_.planner.margin * std::pow(widening, static_cast<double>(state.stops % widenings));
+    margin_ = settings_.planner.search.margin * std::pow(widening, static_cast<double>(state.stops % widenings));
   }
   // Straight to the goal where that is free with the margin; not where the arm was stuck, which needs another way.
   // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place, and shorter, among
@@ -71,7 +71,7 @@ void OnlinePlanner::look(const State& state) {
   const bool taken_up = state.route_number == route_number_;
   const bool lets_go =
       !have_path_ || (changed_ && taken_up && (state.goal - state.q).norm() < shorter * (rounded_->length() - state.station));
-  const PlannerSettings& asked = settings_.planner;
+  const PlannerSettings& asked = settings_.planner.search;
   const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
   const bool straight = lets_go && state.stops == 0 && !stuck && planner_.sees(state.q, state.goal, wide, obstacles);
   if (straight) {
@@ -101,7 +101,7 @@ void OnlinePlanner::look(const State& state) {
   }
   direct_ = false;
   const bool out_of_budget = status_ == PlanStatus::no_path || status_ == PlanStatus::timeout;
-  if (failed_ && out_of_budget && !changed_ && !stuck && state.time - failed_at_ < settings_.retry) {
+  if (failed_ && out_of_budget && !changed_ && !stuck && state.time - failed_at_ < settings_.planner.retry) {
     return;
   }
   changed_ = false;
@@ -154,7 +154,7 @@ bool OnlinePlanner::overtaken() {
 }
 
 bool OnlinePlanner::holds_on(const State& state, const Obstacles& obstacles) {
-  const double floor = settings_.planner.floor;
+  const double floor = settings_.planner.search.floor;
   if (planner_.sees(state.q, on_route(state.station), floor, obstacles)) {
     return true;
   }
@@ -166,7 +166,7 @@ bool OnlinePlanner::holds_on(const State& state, const Obstacles& obstacles) {
   Eigen::MatrixXd path = path_;
   if (!planner_.enter(path, waypoint_after(state.station), path_margins_.margin, here, obstacles)) {
     double station = state.station;
-    const double earliest = std::max(0.0, station - settings_.route.lead);
+    const double earliest = std::max(0.0, station - settings_.planner.route.lead);
     do {
       if (station <= earliest) {
         return false;
@@ -183,7 +183,7 @@ bool OnlinePlanner::holds_on(const State& state, const Obstacles& obstacles) {
 }
 
 void OnlinePlanner::search(const State& state, const Obstacles& obstacles) {
-  const double margin = std::max(margin_, settings_.planner.floor);
+  const double margin = std::max(margin_, settings_.planner.search.floor);
   const std::uint64_t seed = settings_.seed + searches_++;
   Plan plan = planner_.find(within_limits(state.q), state.goal, obstacles, seed);
   const PlanStatus status = plan.status;
@@ -236,8 +236,8 @@ void OnlinePlanner::follow(const State& state, const Eigen::MatrixXd& path, cons
   }
   rounded_.emplace(path_, body_, obstacles, path_margins_, planner_.workspace());
   const Eigen::VectorXd v = settings_.synchronous ? state.v : states_.get().v;
-  route_ = std::make_shared<const TimedPath>(make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety,
-                                                        planner_.workspace(), measured,
+  route_ = std::make_shared<const TimedPath>(make_route(*rounded_, v, body_, obstacles, settings_.planner.route,
+                                                        settings_.safety, planner_.workspace(), measured,
                                                         settings_.dynamics ? &*settings_.dynamics : nullptr));
   ++route_number_;
   answer(state, PlanStatus::found);
@@ -253,7 +253,7 @@ void OnlinePlanner::answer(const State& state, PlanStatus status) {
   if (status == PlanStatus::found) {
     answer.route = route_;
     // A joint that slides at 1 cm/s, or a narrow place, is no reason to look for another way.
-    answer.progress = std::min(usual_progress, progress_share * route_->motion.slowest(settings_.patience));
+    answer.progress = std::min(usual_progress, progress_share * route_->motion.slowest(settings_.planner.patience));
     const std::lock_guard lock(mutex_);
     shown_route_ = route_;
     shown_route_number_ = route_number_;

@@ -93,7 +93,7 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
 
 BOOST_AUTO_TEST_CASE(a_path_that_is_blocked_while_it_is_improved_is_given_up_at_once) {
   OnlinePlannerConfig settings;
-  settings.planner.shortcuts = 1'000'000;  // for longer than anybody waits
+  settings.planner.search.shortcuts = 1'000'000;  // for longer than anybody waits
   OnlinePlanner guide(test::planar_arm_body(), settings);
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
@@ -124,13 +124,13 @@ BOOST_AUTO_TEST_CASE(a_path_that_is_blocked_while_it_is_improved_is_given_up_at_
 BOOST_AUTO_TEST_CASE(an_arm_that_is_off_its_path_finds_back_to_it) {
   OnlinePlannerConfig settings;
   settings.synchronous = true;
-  settings.route.lead = 3.0;
-  settings.patience = 20.0;
+  settings.planner.route.lead = 3.0;
+  settings.planner.patience = 20.0;
   OnlinePlanner guide(test::planar_arm_body(), settings);
   const Obstacles obstacles = point(0.5, 0.0);
   guide.set_obstacles(obstacles);
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
-  RrtConnect eyes(guide.body(), settings.planner);
+  RrtConnect eyes(guide.body(), settings.planner.search);
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
   OnlinePlanner::Reference reference(2);
   double time = 0.0;
@@ -138,13 +138,13 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_off_its_path_finds_back_to_it) {
   bool seen = true;
   for (; time < 15.0 && seen; time += 0.001) {
     static_cast<void>(guide.step(q, time, reference));
-    seen = eyes.sees(q, reference.position, settings.planner.floor, obstacles);
+    seen = eyes.sees(q, reference.position, settings.planner.search.floor, obstacles);
   }
   BOOST_TEST(!seen);
   for (int i = 0; i < 30; ++i, time += 0.001) {  // past its next look
     static_cast<void>(guide.step(q, time, reference));
   }
-  BOOST_TEST(eyes.sees(q, reference.position, settings.planner.floor, obstacles));
+  BOOST_TEST(eyes.sees(q, reference.position, settings.planner.search.floor, obstacles));
   BOOST_TEST(guide.counts().searches == 1);
   BOOST_TEST(name(follow(guide, q, time, 20.0)) == "arrived");
   BOOST_TEST(guide.counts().searches == 1);

@@ -10,8 +10,7 @@
 #include "sidestep/attractor/local_minimum_recovery.hpp"
 #include "sidestep/planning/look_ahead.hpp"
 #include "sidestep/math/fields.hpp"
-#include "sidestep/planning/timed_path.hpp"
-#include "sidestep/planning/rrt_connect.hpp"
+#include "sidestep/planning/online_planner.hpp"
 
 namespace sidestep {
 
@@ -30,15 +29,6 @@ struct ArrivalSettings {
   double position = 0.001;   ///< of a pose goal [m]
   double rotation = 0.0087;  ///< of a pose goal [rad]: half a degree
   double speed = 0.05;       ///< largest joint speed [rad/s | m/s]
-};
-
-/// The planner that runs beside the loop, see OnlinePlanner.
-struct OnlinePlannerSettings {
-  PlannerSettings search = {};
-  TimedPathSettings route = {};
-  double period = 0.02;   ///< between two looks at the scene [s]
-  double patience = 1.0;  ///< without progress until it plans again [s]
-  double retry = 1.0;     ///< until a failed search is repeated in the same scene [s]
 };
 
 /// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ζ ω (v_r − v), with what the
@@ -112,7 +102,6 @@ template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
 template <> const std::vector<Field<TrackingSettings>>& fields();
 template <> const std::vector<Field<InputSettings>>& fields();
-template <> const std::vector<Field<OnlinePlannerSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
 
 }  // namespace sidestep
