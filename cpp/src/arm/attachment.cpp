@@ -98,6 +98,49 @@ std::vector<Ellipsoid> placed(const Attachment& object, const Eigen::Isometry3d&
   return all;
 }
 
+/// Throws std::invalid_argument unless the object can be attached to the arm, at q if that is not empty.
+void check_attachable(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q) {
+  const Robot& robot = arm.robot();
+  if (object.name.empty()) {
+    refuse(object, "the name is empty");
+  }
+  if (std::any_of(robot.frames().begin(), robot.frames().end(), [&](const Frame& f) { return f.name == object.name; })) {
+    refuse(object, "the arm has a frame of this name; detach it first, or take another name");
+  }
+  const Frame& link = robot.frames()[static_cast<std::size_t>(robot.frame_index(object.link))];
+  if (link.joint < 0) {
+    refuse(object, "no joint moves link '" + object.link + "'");
+  }
+  const Eigen::Matrix3d R = object.X_LA.linear();
+  if (!object.X_LA.matrix().allFinite() || !(R * R.transpose()).isApprox(Eigen::Matrix3d::Identity(), 1e-6) ||
+      R.determinant() < 0.0) {
+    refuse(object, "the pose must be finite, a rotation and a position");
+  }
+  if (object.cover.size() == 0) {
+    refuse(object, "it has no ellipsoid: nothing would keep it off obstacles");
+  }
+  if (q.size() != 0 && (q.size() != robot.num_coordinates() || !q.allFinite())) {
+    refuse(object, "q has " + std::to_string(q.size()) + " entries, needed are " + std::to_string(robot.num_coordinates()) +
+                       " finite ones");
+  }
+  object.inertial.validate("attach '" + object.name + "'");
+  for (const std::string& name : object.may_touch) {
+    robot.frame_index(name);
+  }
+}
+
+/// Lets pairs of an attached object that are near each other at q be as near as there.
+void let_near_pairs_be(std::vector<LinkPair>& own, const Robot& larger, const Body& body, const Eigen::VectorXd& q) {
+  const BodyClearance clearance(larger, body, own);
+  BodyClearance::Workspace w(clearance);
+  Eigen::VectorXd gaps(clearance.num_items());
+  clearance.clearances(q, Obstacles::none(), attached_room, w, gaps);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const auto item = clearance.num_items() - static_cast<Eigen::Index>(own.size()) + static_cast<Eigen::Index>(k);
+    own[k].contact = std::min(0.0, gaps[item] - attached_room);
+  }
+}
+
 }  // namespace
 
 std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q) {
@@ -143,34 +186,9 @@ std::string doubt(const Arm& holding, const Attachment& object, const Eigen::Vec
 }
 
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q) {
+  check_attachable(arm, object, q);
   const Robot& robot = arm.robot();
-  if (object.name.empty()) {
-    refuse(object, "the name is empty");
-  }
-  if (std::any_of(robot.frames().begin(), robot.frames().end(), [&](const Frame& f) { return f.name == object.name; })) {
-    refuse(object, "the arm has a frame of this name; detach it first, or take another name");
-  }
   const Frame& link = robot.frames()[static_cast<std::size_t>(robot.frame_index(object.link))];
-  if (link.joint < 0) {
-    refuse(object, "no joint moves link '" + object.link + "'");
-  }
-  const Eigen::Matrix3d R = object.X_LA.linear();
-  if (!object.X_LA.matrix().allFinite() || !(R * R.transpose()).isApprox(Eigen::Matrix3d::Identity(), 1e-6) ||
-      R.determinant() < 0.0) {
-    refuse(object, "the pose must be finite, a rotation and a position");
-  }
-  if (object.cover.size() == 0) {
-    refuse(object, "it has no ellipsoid: nothing would keep it off obstacles");
-  }
-  if (q.size() != 0 && (q.size() != robot.num_coordinates() || !q.allFinite())) {
-    refuse(object, "q has " + std::to_string(q.size()) + " entries, needed are " + std::to_string(robot.num_coordinates()) +
-                       " finite ones");
-  }
-  object.inertial.validate("attach '" + object.name + "'");
-  for (const std::string& name : object.may_touch) {
-    robot.frame_index(name);
-  }
-
   const Frame frame{object.name, link.joint, link.X_JF * object.X_LA};
   std::vector<Frame> frames = robot.frames();
   frames.push_back(frame);
@@ -191,14 +209,7 @@ Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q) {
     }
   }
   if (q.size() != 0 && !own.empty()) {
-    const BodyClearance clearance(larger, body, own);
-    BodyClearance::Workspace w(clearance);
-    Eigen::VectorXd gaps(clearance.num_items());
-    clearance.clearances(q, Obstacles::none(), attached_room, w, gaps);
-    for (std::size_t k = 0; k < own.size(); ++k) {
-      const auto item = clearance.num_items() - static_cast<Eigen::Index>(own.size()) + static_cast<Eigen::Index>(k);
-      own[k].contact = std::min(0.0, gaps[item] - attached_room);
-    }
+    let_near_pairs_be(own, larger, body, q);
   }
   pairs.insert(pairs.end(), own.begin(), own.end());
 
