@@ -118,7 +118,8 @@ Arm decode_arm(std::span<const std::byte> file) {
                                 std::to_string(size) + " must be: it was cut off or changed" + arm_file_advice);
   }
   if (const Sha256 of_content = sha256(payload); !std::equal(of_content.begin(), of_content.end(), hash.begin())) {
-    throw std::invalid_argument(std::string("its content does not have the hash that it states: it is damaged") + arm_file_advice);
+    throw std::invalid_argument(std::string("its content does not have the hash that it states: it is damaged") +
+                                arm_file_advice);
   }
   ArmReader in(payload);
   return read_sections(in, found);
