@@ -1,11 +1,10 @@
 #include "sidestep/planning/online_planner.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <string>
-
-#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {
@@ -29,49 +28,18 @@ const char* name(OnlinePlannerStatus status) noexcept {
   return "unknown";
 }
 
-template <>
-const std::vector<Field<OnlinePlannerSettings>>& fields() {
-  using S = OnlinePlannerSettings;
-  static const std::vector<Field<S>> all{
-      {"period", &S::period, "s", 0.001, 10.0, "between two looks of the planner at the scene: shorter reacts earlier"},
-      {"patience", &S::patience, "s", 0.05, 60.0, "without progress until another path is looked for"},
-      {"retry", &S::retry, "s", 0.05, 600.0, "until a failed search is repeated in the same scene"},
-  };
-  return all;
-}
-
-void OnlinePlannerConfig::validate() const {
-  planner.search.validate();
-  planner.route.validate();
-  const auto positive = [](double value, const char* what) { require(value > 0.0, what, value, "positive"); };
-  positive(planner.period, "online planner: period");
-  positive(planner.patience, "online planner: patience");
-  positive(planner.retry, "online planner: retry");
-  positive(tolerance, "online planner: tolerance");
-  positive(duration, "online planner: duration");
-}
-
 OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& settings)
     : body_(std::move(body)),
       settings_((settings.validate(), settings)),
+      exchange_(body_.robot().num_coordinates()),
       goal_(Eigen::VectorXd::Zero(body_.robot().num_coordinates())),
       last_q_(goal_),
       velocity_(goal_),
       progress_(settings.planner.patience),
       here_(body_),
-      states_(State{goal_, goal_, goal_}),
-      answers_(Answer{}),
-      looked_(Looked{}),
-      newest_(std::make_shared<const Obstacles>(Obstacles::none())),
-      planner_(body_, settings.planner.search),
-      obstacles_(newest_),
-      watch_(body_),
-      margin_(settings.planner.search.margin) {
+      keeper_(body_, settings_, exchange_) {
   if (settings_.works && !settings_.synchronous) {
-    planner_.interrupt_when([this] {
-      newer_ = states_.update() || newer_;
-      return stopping_.load() || states_.get().goal_number != seen_goal_ || overtaken();
-    });
+    keeper_.interrupt_when_overtaken(stopping_);
     thread_ = std::thread([this] { run(); });
   }
 }
@@ -96,17 +64,13 @@ void OnlinePlanner::set_goal(const Eigen::VectorXd& goal) {
   progress_.reset();
 }
 
-void OnlinePlanner::set_obstacles(const Obstacles& obstacles) {
-  const auto same = [&](const Obstacles& o) {
-    return o.size() == obstacles.size() && o.points() == obstacles.points() && o.radii() == obstacles.radii();
-  };
-  auto copy = std::make_shared<const Obstacles>(obstacles);
-  const std::lock_guard lock(mutex_);
-  if (same(*newest_)) {
-    return;
+void OnlinePlanner::run() {
+  while (!stopping_.load()) {
+    static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.planner.period)));
+    if (!stopping_.load()) {
+      keeper_.look_at_newest();
+    }
   }
-  newest_.swap(copy);
-  ++scene_number_;
 }
 
 bool OnlinePlanner::disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept {
@@ -126,6 +90,21 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     }
     return goal_number_ == 0 ? OnlinePlannerStatus::idle : OnlinePlannerStatus::invalid;
   }
+  tell(q, time);
+  hear(time);
+  const Answer& answer = exchange_.answers.current();
+  lead(answer, q, time, reference);
+  last_time_ = time;
+
+  if ((q - goal_).cwiseAbs().maxCoeff() < settings_.tolerance) {
+    progress_.reset();
+    return OnlinePlannerStatus::arrived;
+  }
+  watch_progress(answer, q, time, reference);
+  return status(answer, time);
+}
+
+void OnlinePlanner::tell(ConstVectorRef q, double time) {
   const bool first = !started_;
   if (first) {
     started_ = true;
@@ -136,69 +115,73 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     velocity_ = (q - last_q_) / (time - last_time_);
     last_q_ = q;
   }
-  // Tell the planner; in a thread it looks at its own pace, and at once at a new goal.
-  if (!settings_.synchronous || time >= next_look_) {
-    State& state = states_.draft();
-    state.q = q;
-    state.v = velocity_;
-    state.goal = goal_;
-    state.time = time;
-    state.station = follower_.station;
-    state.goal_number = goal_number_;
-    state.route_number = followed_;
-    state.stops = stops_;
-    state.written = std::chrono::steady_clock::now();
-    states_.submit();
-    if (settings_.synchronous) {
-      next_look_ = time + settings_.planner.period;
-      look_safely(states_.get());
-    } else if (first) {
-      wake_.release();
-    }
+  // In a thread the planner looks at its own pace, and at once at a new goal.
+  if (settings_.synchronous && time < next_look_) {
+    return;
   }
+  PlannerExchange::State& state = exchange_.states.draft();
+  state.q = q;
+  state.v = velocity_;
+  state.goal = goal_;
+  state.time = time;
+  state.station = follower_.station;
+  state.goal_number = goal_number_;
+  state.route_number = followed_;
+  state.stops = stops_;
+  state.written = std::chrono::steady_clock::now();
+  exchange_.states.submit();
+  if (settings_.synchronous) {
+    next_look_ = time + settings_.planner.period;
+    keeper_.look_at(exchange_.states.get());
+  } else if (first) {
+    wake_.release();
+  }
+}
 
-  takes_look_ = looked_.update();
+void OnlinePlanner::hear(double time) noexcept {
+  takes_look_ = exchange_.looked.update();
   if (takes_look_) {
-    const Looked& looked = looked_.current();
+    const Looked& looked = exchange_.looked.current();
     looked_at_ = looked.time;
     look_excess_ = std::max(0.0, looked.duration - (time - looked.time));
   }
-  takes_ = answers_.update();
-  const Answer& answer = answers_.current();
-  const bool ours = answer.goal_number == goal_number_;
-  if (ours && answer.status == PlanStatus::found) {
-    if (answer.route_number != followed_) {
-      followed_ = answer.route_number;
-      follower_.enter(*answer.route, q, velocity_);
-    }
-    reference.position.resize(goal_.size());
-    follower_.advance(*answer.route, settings_.planner.route, q, time - last_time_, reference.position, reference.velocity,
-                      reference.acceleration);
-    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.planner.route, reference.places); num > 0) {
-      reference.num_places = num;
-      reference.arrives = answer.route->length() - follower_.station <= settings_.planner.route.lead;
-    }
-  } else {
-    reference.position = goal_;
-  }
-  last_time_ = time;
+  takes_ = exchange_.answers.update();
+}
 
-  if ((q - goal_).cwiseAbs().maxCoeff() < settings_.tolerance) {
-    progress_.reset();
-    return OnlinePlannerStatus::arrived;
+void OnlinePlanner::lead(const Answer& answer, ConstVectorRef q, double time, Reference& reference) noexcept {
+  if (!leads(answer)) {
+    reference.position = goal_;
+    return;
   }
-  const double left = ours && answer.status == PlanStatus::found ? answer.route->length() - follower_.station : 0.0;
+  if (answer.route_number != followed_) {
+    followed_ = answer.route_number;
+    follower_.enter(*answer.route, q, velocity_);
+  }
+  reference.position.resize(goal_.size());
+  const TimedPathSettings& settings = settings_.planner.route;
+  follower_.advance(*answer.route, settings, q, time - last_time_, reference.position, reference.velocity,
+                    reference.acceleration);
+  if (const Eigen::Index num = follower_.narrow(*answer.route, settings, reference.places); num > 0) {
+    reference.num_places = num;
+    reference.arrives = answer.route->length() - follower_.station <= settings.lead;
+  }
+}
+
+void OnlinePlanner::watch_progress(const Answer& answer, ConstVectorRef q, double time, const Reference& reference) noexcept {
+  const double left = leads(answer) ? answer.route->length() - follower_.station : 0.0;
   const double away = (reference.position - q).norm() + left;
-  if (ours && answer.path_number != measured_) {  // another way may be longer
+  if (answer.goal_number == goal_number_ && answer.path_number != measured_) {  // another way may be longer
     measured_ = answer.path_number;
     progress_.reset();
   }
-  const double progress = ours && answer.status == PlanStatus::found ? answer.progress : usual_progress;
-  if (progress_.update_way(time, away, progress)) {
+  if (progress_.update_way(time, away, leads(answer) ? answer.progress : PathKeeper::usual_progress)) {
     ++stops_;
     progress_.reset();
   }
-  if (ours) {
+}
+
+OnlinePlannerStatus OnlinePlanner::status(const Answer& answer, double time) const noexcept {
+  if (answer.goal_number == goal_number_) {
     switch (answer.status) {
       case PlanStatus::start_in_collision: return OnlinePlannerStatus::start_in_collision;
       case PlanStatus::goal_in_collision: return OnlinePlannerStatus::goal_in_collision;
@@ -219,25 +202,8 @@ double OnlinePlanner::age(double time) const noexcept {
 }
 
 OnlinePlanner::Following OnlinePlanner::following() noexcept {
-  const Answer& answer = answers_.current();
-  const bool follows =
-      answer.goal_number == goal_number_ && answer.status == PlanStatus::found && answer.route_number == followed_;
-  return {follows ? followed_ : 0, follower_};
-}
-
-std::shared_ptr<const TimedPath> OnlinePlanner::route(std::uint64_t number) const {
-  const std::lock_guard lock(mutex_);
-  return number != 0 && number == shown_route_number_ ? shown_route_ : nullptr;
-}
-
-Plan OnlinePlanner::last_plan() const {
-  const std::lock_guard lock(mutex_);
-  return shown_;
-}
-
-OnlinePlanner::Counts OnlinePlanner::counts() const {
-  const std::lock_guard lock(mutex_);
-  return counts_;
+  const Answer& answer = exchange_.answers.current();
+  return {leads(answer) && answer.route_number == followed_ ? followed_ : 0, follower_};
 }
 
 }  // namespace sidestep

@@ -2,21 +2,19 @@
 
 #include <Eigen/Core>
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <semaphore>
 #include <thread>
+#include <utility>
 
-#include "sidestep/math/triple_buffer.hpp"
-#include "sidestep/math/progress_monitor.hpp"
 #include "sidestep/clearance/body_clearance.hpp"
-#include "sidestep/planning/plan.hpp"
-#include "sidestep/planning/timed_path.hpp"
-#include "sidestep/planning/rrt_connect.hpp"
+#include "sidestep/math/interruption.hpp"
+#include "sidestep/math/progress_monitor.hpp"
+#include "sidestep/planning/online_planner_settings.hpp"
+#include "sidestep/planning/path_keeper.hpp"
+#include "sidestep/planning/planner_exchange.hpp"
 
 namespace sidestep {
 
@@ -34,34 +32,6 @@ enum class OnlinePlannerStatus {
 
 /// Short names, for example "goal_in_collision".
 const char* name(OnlinePlannerStatus status) noexcept;
-
-/// How an OnlinePlanner searches, and how its paths are followed.
-struct OnlinePlannerSettings {
-  PlannerSettings search = {};
-  TimedPathSettings route = {};
-  double period = 0.02;   ///< between two looks at the scene [s]
-  double patience = 1.0;  ///< without progress until it plans again [s]
-  double retry = 1.0;     ///< until a failed search is repeated in the same scene [s]
-};
-template <>
-const std::vector<Field<OnlinePlannerSettings>>& fields();
-
-/// What an OnlinePlanner is made for.
-struct OnlinePlannerConfig {
-  OnlinePlannerSettings planner = {};
-  std::optional<RigidBodyDynamics> dynamics;  ///< of an arm that is moved by torque: paths are timed for its motors
-  SafetySettings safety = {};  ///< of what follows: margin, rate and braking_fraction bound the speed near obstacles
-  double tolerance = 0.05;     ///< it has arrived once every joint is this close to the goal [rad | m]
-  double duration = std::numeric_limits<double>::infinity();  ///< allowed for a motion [s]
-  std::uint64_t seed = 0;
-  /// Plans in `step()`, at times given by the planner's period alone, so that a motion is the same every time; else in a thread.
-  bool synchronous = false;
-  /// Plans at all, where it is not synchronous. Without, the loop takes over what `give` hands it: for replays.
-  bool works = true;
-
-  /// Throws std::invalid_argument that names the setting at fault.
-  void validate() const;
-};
 
 /// Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
 ///
@@ -82,7 +52,7 @@ class OnlinePlanner {
 
   /// The obstacles as they are seen now; from any thread, best the camera's. It allocates, and waits for no search.
   /// The same points again are no change.
-  void set_obstacles(const Obstacles& obstacles);
+  void set_obstacles(const Obstacles& obstacles) { exchange_.set_obstacles(obstacles); }
 
   /// The current reference: position, velocity and acceleration (nv) of a JointGoal; and where activation distances
   /// shrink, see GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow
@@ -119,12 +89,12 @@ class OnlinePlanner {
   /// For a synchronous planner: ends a search under way once it says so, as if time ran out.
   void interrupt_when(Interrupted interrupted) {
     if (settings_.synchronous) {
-      planner_.interrupt_when(std::move(interrupted));
+      keeper_.interrupt_when(std::move(interrupted));
     }
   }
 
   /// What the planner found last: the path, or what is in the way. A copy; not for the loop.
-  Plan last_plan() const;
+  Plan last_plan() const { return exchange_.last_plan(); }
   /// Which timed path the loop follows, 0 if none, and where it is on it. For the loop; allocates nothing.
   struct Following {
     std::uint64_t route_number = 0;
@@ -132,67 +102,41 @@ class OnlinePlanner {
   };
   Following following() noexcept;
   /// A timed path by its number; null if there is a newer one. Not for the loop.
-  std::shared_ptr<const TimedPath> route(std::uint64_t number) const;
+  std::shared_ptr<const TimedPath> route(std::uint64_t number) const { return exchange_.route(number); }
 
-  /// How often it searched for a path, and how often it found one.
-  struct Counts {
-    int searches = 0, found = 0;
-  };
-  Counts counts() const;
+  using Counts = PlannerExchange::Counts;
+  Counts counts() const { return exchange_.counts(); }
   const OnlinePlannerConfig& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return body_; }
 
-  /// What the planner tells the loop.
-  struct Answer {
-    std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
-    PlanStatus status = PlanStatus::no_path;
-    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
-    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
-  };
-  /// The newest state that was looked at, and for how long.
-  struct Looked {
-    double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the latter by the machine's clock
-  };
+  using Answer = PlannerExchange::Answer;
+  using Looked = PlannerExchange::Looked;
   /// The answer that the last `step` took over, null if there was no new one. For the loop; valid until its next step.
-  const Answer* taken() const noexcept { return takes_ ? &answers_.current() : nullptr; }
+  const Answer* taken() const noexcept { return takes_ ? &exchange_.answers.current() : nullptr; }
   /// The look whose age the last `step` took over, likewise.
-  const Looked* taken_look() const noexcept { return takes_look_ ? &looked_.current() : nullptr; }
+  const Looked* taken_look() const noexcept { return takes_look_ ? &exchange_.looked.current() : nullptr; }
   /// What the next `step` takes over, of a planner that does not work by itself.
-  void give(Answer answer) { answers_.put(std::move(answer)); }
-  void give(Looked look) { looked_.put(look); }
+  void give(Answer answer) { exchange_.answers.put(std::move(answer)); }
+  void give(Looked look) { exchange_.looked.put(look); }
 
  private:
-  static constexpr double usual_progress = 0.0202;  // [rad | m] within the patience, below which the arm is stuck
-
-  /// What the loop tells the planner.
-  struct State {
-    Eigen::VectorXd q, v, goal;
-    double time = 0.0, station = 0.0;
-    std::uint64_t goal_number = 0;   // 0: none
-    std::uint64_t route_number = 0;  // that it follows
-    std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
-    std::chrono::steady_clock::time_point written{};
-  };
-
   void run();
-  void look(const State& state);
-  /// The same; what is thrown costs this look alone, not the process.
-  void look_safely(const State& state) noexcept;
-  void search(const State& state, const Obstacles& obstacles);
-  /// Whether the rest of the path from a station on is still free.
-  bool ahead_is_free(double station, const Obstacles& obstacles, BodyClearance::Workspace& w) const;
-  /// Whether something new blocks the first path, while a better one is made from it.
-  bool overtaken();
-  /// Whether the straight edge to the reference is free, or else finds back to the path, which begins where it is then.
-  bool holds_on(const State& state, const Obstacles& obstacles);
-  void follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured);
-  Eigen::VectorXd on_route(double station) const;
-  Eigen::Index waypoint_after(double station) const;
-  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const { return body_.robot().limits().nearest_within(q); }
-  void answer(const State& state, PlanStatus status);
+  /// Tells the planner's side where the arm is; looks at once if it is synchronous.
+  void tell(ConstVectorRef q, double time);
+  /// Takes over what the planner's side found.
+  void hear(double time) noexcept;
+  /// Whether the planner's answer is about the goal, and a path.
+  bool leads(const Answer& answer) const noexcept {
+    return answer.goal_number == goal_number_ && answer.status == PlanStatus::found;
+  }
+  void lead(const Answer& answer, ConstVectorRef q, double time, Reference& reference) noexcept;
+  /// Counts a stop where the arm makes no progress towards the goal.
+  void watch_progress(const Answer& answer, ConstVectorRef q, double time, const Reference& reference) noexcept;
+  OnlinePlannerStatus status(const Answer& answer, double time) const noexcept;
 
   BodyClearance body_;
   OnlinePlannerConfig settings_;
+  PlannerExchange exchange_;
 
   // Of the loop.
   Eigen::VectorXd goal_, last_q_, velocity_;
@@ -206,37 +150,10 @@ class OnlinePlanner {
   double look_excess_ = 0.0;  // by which that look took longer by the machine's clock than by the steps' [s]
   BodyClearance::Workspace here_;
 
-  // Between the two.
-  TripleBuffer<State> states_;
-  TripleBuffer<Answer> answers_;
-  TripleBuffer<Looked> looked_;
+  // Of the planner's thread.
+  PathKeeper keeper_;
   std::counting_semaphore<> wake_{0};
   std::atomic<bool> stopping_{false};
-  mutable std::mutex mutex_;  // of what follows; the loop never takes it
-  std::shared_ptr<const Obstacles> newest_;
-  std::uint64_t scene_number_ = 0;
-  Plan shown_;
-  std::shared_ptr<const TimedPath> shown_route_;
-  std::uint64_t shown_route_number_ = 0;
-  Counts counts_;
-
-  // Of the planner's thread.
-  RrtConnect planner_;
-  std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
-  std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, path_number_ = 0, searches_ = 0;
-  bool newer_ = false;  // a state was taken that it has not looked at
-  bool have_path_ = false, direct_ = false, failed_ = false;
-  bool changed_ = false;  // the scene, since the path was last looked at
-  bool improving_ = false, overtaken_ = false;
-  std::uint64_t watched_scene_ = 0;
-  BodyClearance::Workspace watch_;  // as the planner's is in use then
-  double margin_, failed_at_ = 0.0;
-  PlanStatus status_ = PlanStatus::no_path;
-  Eigen::MatrixXd path_;
-  Eigen::VectorXd stations_;  // of its waypoints
-  Margins path_margins_;
-  std::optional<RoundedPath> rounded_;
-  std::shared_ptr<const TimedPath> route_;
   std::thread thread_;
 };
 

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/math/interruption.hpp"
+#include "sidestep/planning/kept_path.hpp"
+#include "sidestep/planning/online_planner_settings.hpp"
+#include "sidestep/planning/planner_exchange.hpp"
+#include "sidestep/planning/rrt_connect.hpp"
+
+namespace sidestep {
+
+/// The part of an OnlinePlanner beside the loop: looks at the scene, finds paths and keeps to them.
+///
+/// At every state that it takes from the exchange it says whether the way ahead is still free among the newest obstacles and the
+/// arm makes progress, and searches again from where the arm is where that is not so; after a stop with a larger margin. One
+/// thread at a time.
+class PathKeeper {
+ public:
+  using State = PlannerExchange::State;
+  /// Way within the patience below which the arm is stuck [rad | m]; on a slow path less.
+  static constexpr double usual_progress = 0.0202;
+
+  /// All of them must outlive the keeper.
+  PathKeeper(const BodyClearance& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange);
+
+  /// Looks at a state, and answers where something changes. What is thrown costs this look alone, not the process.
+  void look_at(const State& state) noexcept;
+  /// Looks at the newest state, unless it has, and says so.
+  void look_at_newest();
+
+  /// Ends a search under way once it says so, as if time ran out.
+  void interrupt_when(Interrupted interrupted) { search_.interrupt_when(std::move(interrupted)); }
+  /// Ends a search once `stopping`, at a new goal, and where something new blocks the path that it improves.
+  void interrupt_when_overtaken(const std::atomic<bool>& stopping);
+
+ private:
+  void look(const State& state);
+  void take_goal(const State& state);
+  /// The margin [m] with which the way straight to the goal is taken; empty where a path is held on to, or it is not free.
+  std::optional<double> straight_margin(const State& state, const Obstacles& obstacles, bool stuck);
+  void go_straight(const State& state, double margin, const Obstacles& obstacles);
+  void search(const State& state, const Obstacles& obstacles);
+  /// Improves the first path of a search, which an arm may follow meanwhile; false if something new blocks that one.
+  bool improve(Plan& plan, const State& state, const Obstacles& obstacles, std::uint64_t seed, double margin);
+  /// Whether something new blocks the first path, while a better one is made from it.
+  bool overtaken();
+  /// Whether the straight edge to the reference is free, or else finds back to the path, which begins where it is then.
+  bool holds_on(const State& state, const Obstacles& obstacles);
+  void follow(const State& state, const Eigen::MatrixXd& path, const Margins& margins, const Obstacles& obstacles,
+              bool measured);
+  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const { return body_.robot().limits().nearest_within(q); }
+  void answer(const State& state, PlanStatus status);
+
+  const BodyClearance& body_;
+  const OnlinePlannerConfig& settings_;
+  PlannerExchange& exchange_;
+  RrtConnect search_;
+  KeptPath path_;
+  std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
+  std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, path_number_ = 0, searches_ = 0;
+  bool newer_ = false;  // a state was taken that it has not looked at
+  bool have_path_ = false, direct_ = false, failed_ = false;
+  bool changed_ = false;  // the scene, since the path was last looked at
+  bool improving_ = false, overtaken_ = false;
+  std::uint64_t watched_scene_ = 0;
+  BodyClearance::Workspace watch_;  // as the search's is in use then
+  double margin_, failed_at_ = 0.0;
+  PlanStatus status_ = PlanStatus::no_path;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+
+#include "sidestep/math/triple_buffer.hpp"
+#include "sidestep/planning/plan.hpp"
+#include "sidestep/planning/timed_path.hpp"
+#include "sidestep/scene/obstacles.hpp"
+
+namespace sidestep {
+
+/// What a loop and the planner beside it tell each other. The loop's side never waits.
+class PlannerExchange {
+ public:
+  /// What the loop tells the planner.
+  struct State {
+    Eigen::VectorXd q, v, goal;
+    double time = 0.0, station = 0.0;
+    std::uint64_t goal_number = 0;   // 0: none
+    std::uint64_t route_number = 0;  // that it follows
+    std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
+    std::chrono::steady_clock::time_point written{};
+  };
+
+  /// What the planner tells the loop.
+  struct Answer {
+    std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
+    PlanStatus status = PlanStatus::no_path;
+    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
+    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
+  };
+  /// The newest state that was looked at, and for how long.
+  struct Looked {
+    double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the latter by the machine's clock
+  };
+
+  /// How often the planner searched for a path, and how often it found one.
+  struct Counts {
+    int searches = 0, found = 0;
+  };
+
+  explicit PlannerExchange(Eigen::Index nv);
+
+  TripleBuffer<State> states;
+  TripleBuffer<Answer> answers;
+  TripleBuffer<Looked> looked;
+
+  /// The obstacles as they are seen now; from any thread. The same points again are no change.
+  void set_obstacles(const Obstacles& obstacles);
+  /// The newest obstacles if their number is not `seen`, which it becomes; else null.
+  std::shared_ptr<const Obstacles> newer_obstacles(std::uint64_t& seen) const;
+
+  /// For who asks beside the loop: what the last search found, and the timed path that is followed.
+  void show(Plan plan);
+  void show(std::shared_ptr<const TimedPath> route, std::uint64_t number);
+  Plan last_plan() const;
+  Counts counts() const;
+  /// A timed path by its number; null if there is a newer one.
+  std::shared_ptr<const TimedPath> route(std::uint64_t number) const;
+
+ private:
+  mutable std::mutex mutex_;  // of what follows; the loop never takes it
+  std::shared_ptr<const Obstacles> newest_;
+  std::uint64_t scene_number_ = 0;
+  Plan plan_;
+  std::shared_ptr<const TimedPath> route_;
+  std::uint64_t route_number_ = 0;
+  Counts counts_;
+};
+
+}  // namespace sidestep
