@@ -36,11 +36,11 @@ class PathPlanner {
     const PlannerSettings& s = planner_.settings();
     return {margin.value_or(s.margin), s.slack, s.fade, {}};
   }
-  const BodyClearance& body() const { return body_; }
+  const ClearanceQuery& body() const { return body_; }
   RrtConnect& planner() { return planner_; }
 
  private:
-  BodyClearance body_;
+  ClearanceQuery body_;
   RrtConnect planner_;
 };
 
@@ -148,7 +148,7 @@ void bind_guide(nb::module_& m) {
             OnlinePlannerConfig s;
             s.planner = {planner.value_or(PlannerSettings{}), route.value_or(TimedPathSettings{}), period, patience, retry};
             s.tolerance = tolerance, s.duration = duration, s.seed = seed, s.synchronous = synchronous;
-            new (self) OnlinePlanner(BodyClearance(robot, body, link_pairs(pairs), {}, std::move(tables)), s);
+            new (self) OnlinePlanner(ClearanceQuery(robot, body, link_pairs(pairs), {}, std::move(tables)), s);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
           nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("planner") = nb::none(),
@@ -245,7 +245,7 @@ void bind_guidance(nb::module_& m) {
           "clearance",
           [](PathPlanner& p, const ArrayLike& q, const Obstacles& obstacles, double cap) {
             const Exclusive use(&p, "the planner");
-            const BodyClearance::Nearest n =
+            const ClearanceQuery::Nearest n =
                 p.body().nearest(p.configuration(q, "q"), obstacles, cap, p.planner().workspace());
             return ClearanceReport{n.clearance, n.item < 0 ? CoordinateLabel{} : p.body().label(n.item), n.point};
           },

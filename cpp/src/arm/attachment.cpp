@@ -11,7 +11,7 @@
 #include "../math/settings.hpp"
 #include "sidestep/clearance/ellipsoid_gap.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep {
 namespace {
@@ -131,8 +131,8 @@ void check_attachable(const Arm& arm, const Attachment& object, const Eigen::Vec
 
 /// Lets pairs of an attached object that are near each other at q be as near as there.
 void let_near_pairs_be(std::vector<LinkPair>& own, const Robot& larger, const Body& body, const Eigen::VectorXd& q) {
-  const BodyClearance clearance(larger, body, own);
-  BodyClearance::Workspace w(clearance);
+  const ClearanceQuery clearance(larger, body, own);
+  ClearanceQuery::Workspace w(clearance);
   Eigen::VectorXd gaps(clearance.num_items());
   clearance.clearances(q, Obstacles::none(), attached_room, w, gaps);
   for (std::size_t k = 0; k < own.size(); ++k) {

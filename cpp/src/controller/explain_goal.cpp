@@ -45,7 +45,7 @@ std::string way_out(const Robot& robot, const Obstruction& here) {
 
 }  // namespace
 
-std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const BodyClearance& body) {
+std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const ClearanceQuery& body) {
   const Request request = board.newest_request();
   const std::optional<Posture> posture = board.posture();
   const Goal* const goal = std::get_if<Goal>(&request);

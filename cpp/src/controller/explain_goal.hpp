@@ -15,7 +15,7 @@ namespace sidestep {
 // Why the arm is not at its goal, in words. All of it allocates.
 
 /// What the covering body touches at the goal that was set, or at the posture found for it; nothing where that is free.
-std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const BodyClearance& body);
+std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const ClearanceQuery& body);
 /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
 std::string explain_target(const ControllerModel& model, const RequestBoard& board, const InputsStage& inputs,
                            double obstacle_age);

@@ -17,7 +17,7 @@ constexpr double held_inside = 1.0;
 // Speed of a frame on the path, as a share of the limit, so that rows which slow the arm do not let the reference run ahead [-].
 constexpr double of_limit = 0.95;
 
-std::unique_ptr<OnlinePlanner> make_planner(const BodyClearance& body, const ControllerSettings& settings,
+std::unique_ptr<OnlinePlanner> make_planner(const ClearanceQuery& body, const ControllerSettings& settings,
                                             const std::optional<RigidBodyDynamics>& dynamics, bool works) {
   if (!settings.planner) {
     return nullptr;
@@ -39,7 +39,7 @@ std::unique_ptr<OnlinePlanner> make_planner(const BodyClearance& body, const Con
 
 GoalMemory::GoalMemory(Eigen::Index nv) : target(Eigen::VectorXd::Zero(nv)), led(JointGoal(target)) {}
 
-GoalFollower::GoalFollower(const BodyClearance& body, const ControllerSettings& settings, const JointKinds& joints,
+GoalFollower::GoalFollower(const ClearanceQuery& body, const ControllerSettings& settings, const JointKinds& joints,
                            const std::optional<RigidBodyDynamics>& dynamics, RequestBoard& board, bool works)
     : GoalMemory(body.robot().num_coordinates()),
       body_(body),

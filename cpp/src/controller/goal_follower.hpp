@@ -48,7 +48,7 @@ struct GoalMemory {
 class GoalFollower : private GoalMemory {
  public:
   /// `works`: the planner has a thread of its own unless the controller is synchronous.
-  GoalFollower(const BodyClearance& body, const ControllerSettings& settings, const JointKinds& joints,
+  GoalFollower(const ClearanceQuery& body, const ControllerSettings& settings, const JointKinds& joints,
                const std::optional<RigidBodyDynamics>& dynamics, RequestBoard& board, bool works);
 
   /// The moment of a step.
@@ -129,7 +129,7 @@ class GoalFollower : private GoalMemory {
   /// Takes what the worker found, and goes on to another posture where no way leads to this one.
   void update_posture(const PoseGoal& pose, const Moment& now) noexcept;
 
-  const BodyClearance& body_;
+  const ClearanceQuery& body_;
   const ControllerSettings& settings_;
   const JointKinds& joints_;
   RequestBoard& board_;

@@ -2,7 +2,7 @@
 
 namespace sidestep {
 
-InputsStage::InputsStage(RequestBoard& board, const BodyClearance& body, const Robot& robot, const JointKinds& joints,
+InputsStage::InputsStage(RequestBoard& board, const ClearanceQuery& body, const Robot& robot, const JointKinds& joints,
                          const ControllerSettings& settings, const UsableLimits& usable,
                          const std::vector<Eigen::Index>& clearances, const std::optional<RigidBodyDynamics>& dynamics,
                          bool works)

@@ -14,7 +14,7 @@ namespace sidestep {
 /// Stage `inputs`: what the reference is led to in this step, by a goal, velocity, twist or trajectory, or to rest.
 class InputsStage {
  public:
-  InputsStage(RequestBoard& board, const BodyClearance& body, const Robot& robot, const JointKinds& joints,
+  InputsStage(RequestBoard& board, const ClearanceQuery& body, const Robot& robot, const JointKinds& joints,
               const ControllerSettings& settings, const UsableLimits& usable, const std::vector<Eigen::Index>& clearances,
               const std::optional<RigidBodyDynamics>& dynamics, bool works);
 

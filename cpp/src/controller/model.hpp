@@ -7,7 +7,7 @@
 #include "input.hpp"
 #include "joint_kinds.hpp"
 #include "sidestep/attractor/geometric_system.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/arm/arm.hpp"
@@ -23,7 +23,7 @@ struct ControllerModel {
   const ControllerSettings settings;
   const bool torque;                                ///< it is what the arm is moved by
   const std::optional<RigidBodyDynamics> dynamics;  ///< with torque, where the arm has inertias
-  const BodyClearance body;                         ///< its items are those of the system's barriers
+  const ClearanceQuery body;                         ///< its items are those of the system's barriers
   const std::shared_ptr<const GeometricSystem> system;
   const Plausibility plausible;
   const JointKinds joints;

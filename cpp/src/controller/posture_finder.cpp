@@ -12,7 +12,7 @@ constexpr int starts_again = 20;  // and for another one
 
 }  // namespace
 
-PostureFinder::PostureFinder(const BodyClearance& body, const ControllerSettings& settings)
+PostureFinder::PostureFinder(const ClearanceQuery& body, const ControllerSettings& settings)
     : body_(body),
       settings_(settings),
       endpoint_checker_(body, settings.planner ? settings.planner->search : PlannerSettings{}),
@@ -30,7 +30,7 @@ Posture PostureFinder::find(const PoseGoal& goal, const Eigen::VectorXd& near, c
   bool free_of_itself = false;
   Posture posture =
       find_posture(body_.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
-        const BodyClearance::Nearest own = body_.nearest(q, Obstacles::none(), 0.0, workspace_);
+        const ClearanceQuery::Nearest own = body_.nearest(q, Obstacles::none(), 0.0, workspace_);
         free_of_itself = free_of_itself || own.clearance >= 0.0 || body_.label(own.item).kind == CoordinateLabel::Kind::effort;
         return endpoint_checker_.obstructed(q, obstacles, obstruction)
                    ? -infinity

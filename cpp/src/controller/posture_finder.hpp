@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/planning/rrt_connect.hpp"
@@ -13,16 +13,16 @@ namespace sidestep {
 /// Finds a posture for a pose goal that touches nothing. One thread at a time; allocates.
 class PostureFinder {
  public:
-  PostureFinder(const BodyClearance& body, const ControllerSettings& settings);
+  PostureFinder(const ClearanceQuery& body, const ControllerSettings& settings);
 
   /// The posture from `near` (nv), or from the goal's rest; `attempt` > 0: another one than before.
   Posture find(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles, std::uint64_t attempt);
 
  private:
-  const BodyClearance& body_;
+  const ClearanceQuery& body_;
   const ControllerSettings& settings_;
   RrtConnect endpoint_checker_;  // says what is free at an end
-  BodyClearance::Workspace workspace_;
+  ClearanceQuery::Workspace workspace_;
 };
 
 }  // namespace sidestep

@@ -11,7 +11,7 @@ constexpr double moving_foresight = 1.0;  // time in which what moves could be a
 
 }  // namespace
 
-Sources::Sources(TripleBuffer<NumberedObstacles>& handed_over, const BodyClearance& body, const Robot& robot,
+Sources::Sources(TripleBuffer<NumberedObstacles>& handed_over, const ClearanceQuery& body, const Robot& robot,
                  const Body& ellipsoids, const ControllerSettings& settings)
     : body_(body),
       workspace_(body),

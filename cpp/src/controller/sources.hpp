@@ -6,7 +6,7 @@
 
 #include "closing_estimate.hpp"
 #include "request.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/math/triple_buffer.hpp"
 
@@ -16,7 +16,7 @@ namespace sidestep {
 class Sources {
  public:
   /// `handed_over`: where other threads put obstacles; read by `update` alone.
-  Sources(TripleBuffer<NumberedObstacles>& handed_over, const BodyClearance& body, const Robot& robot, const Body& ellipsoids,
+  Sources(TripleBuffer<NumberedObstacles>& handed_over, const ClearanceQuery& body, const Robot& robot, const Body& ellipsoids,
           const ControllerSettings& settings);
 
   /// Moves the obstacles on by a period, or takes those that were set since. True where they are others. The arm is at q.
@@ -37,8 +37,8 @@ class Sources {
   const ClosingEstimate& closing() const noexcept { return closing_; }
 
  private:
-  const BodyClearance& body_;
-  BodyClearance::Workspace workspace_;
+  const ClearanceQuery& body_;
+  ClearanceQuery::Workspace workspace_;
   const ControllerSettings& settings_;
   TripleBuffer<NumberedObstacles>& buffer_;
   ClosingEstimate closing_;  // beyond the velocities that obstacles were told with

@@ -15,7 +15,7 @@ constexpr double foresight = 0.1;
 
 }  // namespace
 
-SpeedLimiter::SpeedLimiter(const BodyClearance& body, const ControllerSettings& settings)
+SpeedLimiter::SpeedLimiter(const ClearanceQuery& body, const ControllerSettings& settings)
     : body_(body), workspace_(body), settings_(settings), rows_(body.robot()), arm_rows_(rows_) {}
 
 std::optional<double> SpeedLimiter::update(const KinematicState& reference, const KinematicState& arm, bool apart,
@@ -29,7 +29,7 @@ std::optional<double> SpeedLimiter::update(const KinematicState& reference, cons
   const SpeedLimitSettings& limits = *settings_.speed_limits;
   const double period = settings_.period;
   const double far = limits.far_distance, before = known_before ? std::min(command.distance, far) : far;
-  const BodyClearance::Nearest nearest = body_.nearest_obstacle(q, obstacles, far, workspace_);
+  const ClearanceQuery::Nearest nearest = body_.nearest_obstacle(q, obstacles, far, workspace_);
   const double now = nearest.clearance, closing = std::clamp(before - now, 0.0, (command.speed + walking) * period);
   nearest_point_ = nearest.point;
   command.distance = now < far ? now : infinity;

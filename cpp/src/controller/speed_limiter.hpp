@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/constraints/speed_rows.hpp"
 #include "sidestep/constraints/torque_controller.hpp"
 #include "sidestep/controller/command.hpp"
@@ -15,7 +15,7 @@ namespace sidestep {
 /// Limits of Cartesian speed by the distance to obstacles, at the reference and at the arm.
 class SpeedLimiter {
  public:
-  SpeedLimiter(const BodyClearance& body, const ControllerSettings& settings);
+  SpeedLimiter(const ClearanceQuery& body, const ControllerSettings& settings);
 
   /// The arm is at `arm`, at q; `reference` is another state, or the same (`apart` false). Writes the command's speed, speed limit and
   /// distance, of which it takes the last distance where the last step had one (`known_before`). The speed limit [m/s] for the path
@@ -32,8 +32,8 @@ class SpeedLimiter {
   std::string explain(const Command& command, const TorqueSolution& solution, const Obstacles& obstacles) const;
 
  private:
-  const BodyClearance& body_;
-  BodyClearance::Workspace workspace_;
+  const ClearanceQuery& body_;
+  ClearanceQuery::Workspace workspace_;
   const ControllerSettings& settings_;
   SpeedRows rows_, arm_rows_;
   int nearest_point_ = -1;  // of obstacles

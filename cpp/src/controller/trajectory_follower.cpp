@@ -35,7 +35,7 @@ constexpr double deviation_in_words = 0.001;  // deviation that is worth a word 
 TrajectoryMemory::TrajectoryMemory(Eigen::Index nv)
     : begin_q(Eigen::VectorXd::Zero(nv)), begin_v(begin_q), path_q(begin_q), path_v(begin_q), path_a(begin_q) {}
 
-TrajectoryFollower::TrajectoryFollower(const BodyClearance& body, const JointLimits& limits, const JointKinds& joints,
+TrajectoryFollower::TrajectoryFollower(const ClearanceQuery& body, const JointLimits& limits, const JointKinds& joints,
                                        const ControllerSettings& settings, const UsableLimits& usable)
     : TrajectoryMemory(limits.lower.size()),
       body_(body),
@@ -183,7 +183,7 @@ void TrajectoryFollower::look_along(const JointTrajectory& path, double window, 
       c.seen = c.time;
     }
     path.sample(c.seen, seen_q_, seen_v_, seen_a_);
-    const BodyClearance::Nearest nearest = body_.nearest(seen_q_, obstacles, far, workspace_);
+    const ClearanceQuery::Nearest nearest = body_.nearest(seen_q_, obstacles, far, workspace_);
     if (begins) {  // where it is near already it may go on, not nearer
       const bool touches = body_.label(std::max(0, nearest.item)).kind != CoordinateLabel::Kind::effort;
       c.clearance = touches ? std::min(settings_.safety.margin, nearest.clearance - receding)

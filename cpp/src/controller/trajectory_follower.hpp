@@ -7,7 +7,7 @@
 #include "input_target.hpp"
 #include "joint_kinds.hpp"
 #include "request.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep {
 
@@ -19,7 +19,7 @@ struct TrajectoryClock {
   double delay = 0.0;                           // behind time, at the end the last [s]
   double clearance = 0.0;                       // that is asked for [m]
   bool blocked = false;
-  BodyClearance::Nearest blocker{};
+  ClearanceQuery::Nearest blocker{};
 };
 
 /// What following a trajectory remembers from one step to the next, whatever body the arm has.
@@ -36,7 +36,7 @@ struct TrajectoryMemory {
 ///   q̈ = q̈_path + 2 ω (q̇_path + v_back − q̇),   v_back = min(ω |e| / 2, √(a |e|)) sign(e),   e = q_path − q.
 class TrajectoryFollower : private TrajectoryMemory {
  public:
-  TrajectoryFollower(const BodyClearance& body, const JointLimits& limits, const JointKinds& joints,
+  TrajectoryFollower(const ClearanceQuery& body, const JointLimits& limits, const JointKinds& joints,
                      const ControllerSettings& settings, const UsableLimits& usable);
 
   /// The request begins where the reference is.
@@ -82,8 +82,8 @@ class TrajectoryFollower : private TrajectoryMemory {
   /// The last place, in steps from `begin` up to `end` [s], up to which no point of the arm moves by as much as `distance_left` [m].
   double last_free(const JointTrajectory& path, double begin, double end, double distance_left) noexcept;
 
-  const BodyClearance& body_;
-  BodyClearance::Workspace workspace_;
+  const ClearanceQuery& body_;
+  ClearanceQuery::Workspace workspace_;
   const JointLimits& limits_;
   const JointKinds& joints_;
   const ControllerSettings& settings_;

@@ -24,7 +24,7 @@ constexpr int pause = 16;                // [periods] after a torque's stop was 
 
 }  // namespace
 
-Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double margin, double period)
+Failsafe::Failsafe(const ClearanceQuery& body, const JointLimits& limits, double margin, double period)
     : body_(body),
       room_(body),
       limits_(limits),
@@ -187,7 +187,7 @@ void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) 
 
 double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
   const double far = obstacles.tree().moves() ? far_from_moving : far_from_body;
-  const double room = body_.room(q, obstacles, floors_, near_body, far, room_);
+  const double room = body_.distance_left(q, obstacles, floors_, near_body, far, room_);
   if (room >= 0.0) {
     looked_at_.col(at) = q;
   }

@@ -6,7 +6,7 @@
 #include "sidestep/guard/failsafe_stop.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/scene/obstacles.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep {
 
@@ -26,7 +26,7 @@ struct StopTorque {
 ///
 /// A stop is free where the body keeps its clearances, of obstacles and of its own links, above floors: a fifth of the margin, or
 /// what there was when the first stop was found, if that was less. Places are looked at along it; around one no point of the body
-/// moves farther than R·|Δq|, see BodyClearance::reach, so that clearances are known to be as far above the floors, or where that
+/// moves farther than R·|Δq|, see ClearanceQuery::reach, so that clearances are known to be as far above the floors, or where that
 /// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
 ///
 /// Torques that change slowly take long stops. Where there is none, none is looked for in a few periods, as that takes long.
@@ -35,7 +35,7 @@ struct StopTorque {
 class Failsafe {
  public:
   /// `body`, which stays; `limits` of the motion; `margin` of clearances [m]; period [s].
-  Failsafe(const BodyClearance& body, const JointLimits& limits, double margin, double period);
+  Failsafe(const ClearanceQuery& body, const JointLimits& limits, double margin, double period);
 
   /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
   void reset() noexcept {
@@ -74,8 +74,8 @@ class Failsafe {
   /// good for the spacing at least, or by a look.
   double room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
 
-  const BodyClearance& body_;
-  BodyClearance::Workspace room_;
+  const ClearanceQuery& body_;
+  ClearanceQuery::Workspace room_;
   const JointLimits limits_;
   JointLimits slowed_;            // with less acceleration
   const double floor_, spacing_;  // [m] of clearance, and of motion between looks

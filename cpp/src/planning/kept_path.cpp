@@ -5,8 +5,8 @@
 
 namespace sidestep {
 
-void KeptPath::replace(const Eigen::MatrixXd& waypoints, const Margins& margins, const BodyClearance& body,
-                       const Obstacles& obstacles, BodyClearance::Workspace& w) {
+void KeptPath::replace(const Eigen::MatrixXd& waypoints, const Margins& margins, const ClearanceQuery& body,
+                       const Obstacles& obstacles, ClearanceQuery::Workspace& w) {
   margins_ = margins;
   waypoints_ = waypoints;
   stations_ = Eigen::VectorXd::Zero(waypoints_.cols());
@@ -32,8 +32,8 @@ Eigen::Index KeptPath::waypoint_after(double station) const {
   return std::min<Eigen::Index>(next, stations_.size() - 1);
 }
 
-bool KeptPath::is_free_from(double station, const BodyClearance& body, const Obstacles& obstacles,
-                            BodyClearance::Workspace& w) const {
+bool KeptPath::is_free_from(double station, const ClearanceQuery& body, const Obstacles& obstacles,
+                            ClearanceQuery::Workspace& w) const {
   // With what the path was made with. An obstacle that comes a little nearer bends the motion, it does not block the
   // path: half the margin is enough.
   Margins margins = margins_;

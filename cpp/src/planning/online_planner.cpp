@@ -28,7 +28,7 @@ const char* name(OnlinePlannerStatus status) noexcept {
   return "unknown";
 }
 
-OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& settings)
+OnlinePlanner::OnlinePlanner(ClearanceQuery body, const OnlinePlannerConfig& settings)
     : body_(std::move(body)),
       settings_((settings.validate(), settings)),
       exchange_(body_.robot().num_coordinates()),

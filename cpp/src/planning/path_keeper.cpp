@@ -16,7 +16,7 @@ constexpr double back = 0.05;           // between places behind the reference w
 
 }  // namespace
 
-PathKeeper::PathKeeper(const BodyClearance& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange)
+PathKeeper::PathKeeper(const ClearanceQuery& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange)
     : body_(body),
       settings_(settings),
       exchange_(exchange),

@@ -32,8 +32,8 @@ RoundedPath::RoundedPath(const Eigen::MatrixXd& path) {
   }
 }
 
-RoundedPath::RoundedPath(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                         const Margins& margins, BodyClearance::Workspace& workspace)
+RoundedPath::RoundedPath(const Eigen::MatrixXd& path, const ClearanceQuery& body, const Obstacles& obstacles,
+                         const Margins& margins, ClearanceQuery::Workspace& workspace)
     : RoundedPath(path) {
   const double reach = std::max(1e-3, body.reach().maxCoeff());
   for (std::size_t k = 0; k < corners_.size(); ++k) {
@@ -53,8 +53,8 @@ RoundedPath::RoundedPath(const Eigen::MatrixXd& path, const BodyClearance& body,
   }
 }
 
-bool RoundedPath::corner_is_free(std::size_t k, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
-                                 BodyClearance::Workspace& workspace) const {
+bool RoundedPath::corner_is_free(std::size_t k, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
+                                 ClearanceQuery::Workspace& workspace) const {
   const double half = corners_[k].half, turn = (directions_[k + 1] - directions_[k]).norm();
   // A chord over Δs is left by at most Δs²/8 |q''|.
   const double reach = std::max(1e-3, body.reach().maxCoeff());

@@ -13,8 +13,8 @@ using Waypoints = std::vector<Eigen::VectorXd>;
 constexpr double slow_share = 0.5;  // of the median velocity limit, below which a joint counts as slow
 
 /// From every waypoint on to the farthest that can be seen from it.
-Waypoints skip(const Waypoints& path, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
-               BodyClearance::Workspace& w) {
+Waypoints skip(const Waypoints& path, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
+               ClearanceQuery::Workspace& w) {
   Waypoints kept{path.front()};
   for (std::size_t at = 0; at + 1 < path.size();) {
     std::size_t next = path.size() - 1;
@@ -57,8 +57,8 @@ constexpr int misses = 3;         // share of the attempts to shorten that may f
 constexpr double gain = 1e-3;     // a length below which a shortcut is not worth a check [rad]
 
 /// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
-double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness, const BodyClearance& body,
-                const Obstacles& obstacles, double wide, BodyClearance::Workspace& w) {
+double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness, const ClearanceQuery& body,
+                const Obstacles& obstacles, double wide, ClearanceQuery::Workspace& w) {
   const double length = length_of(a, b, slowness);
   const int pieces = 1 + static_cast<int>(length / sample);
   double sum = 0.0;
@@ -129,8 +129,8 @@ class Stretch {
 
 }  // namespace
 
-Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                      const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace,
+Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const ClearanceQuery& body, const Obstacles& obstacles,
+                      const Margins& margins, double wide, RandomStream& random, ClearanceQuery::Workspace& workspace,
                       const Interrupted& interrupted) {
   Eigen::MatrixXd way = path;
   const Eigen::VectorXd &low = body.robot().limits().lower, &high = body.robot().limits().upper;
@@ -158,8 +158,8 @@ Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, co
   return way;
 }
 
-Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                        const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace,
+Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const ClearanceQuery& body, const Obstacles& obstacles,
+                        const Margins& margins, int attempts, RandomStream& random, ClearanceQuery::Workspace& workspace,
                         const Interrupted& interrupted) {
   Waypoints way;
   for (Eigen::Index k = 0; k < path.cols(); ++k) {

@@ -64,7 +64,7 @@ void PlannerSettings::validate() const {
   }
 }
 
-RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& settings)
+RrtConnect::RrtConnect(const ClearanceQuery& body, const PlannerSettings& settings)
     : body_(&body),
       settings_(settings),
       workspace_(body),
@@ -99,7 +99,7 @@ bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles
   if (worst < 0) {
     return false;
   }
-  const BodyClearance::Nearest nearest = body_->nearest(worst, q, obstacles, 0.0, workspace_);
+  const ClearanceQuery::Nearest nearest = body_->nearest(worst, q, obstacles, 0.0, workspace_);
   obstruction = {body_->label(worst), nearest.point, -nearest.clearance,
                  nearest.point < 0 ? std::string() : obstacles.words_for(nearest.point)};
   return true;

@@ -96,8 +96,8 @@ Eigen::Index TimedPath::place_after(double station) const noexcept {
   return std::min<Eigen::Index>(next, place_station.size() - 1);
 }
 
-TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const BodyClearance& body, const Obstacles& obstacles,
-                     const TimedPathSettings& settings, const SafetySettings& safety, BodyClearance::Workspace& workspace,
+TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const ClearanceQuery& body, const Obstacles& obstacles,
+                     const TimedPathSettings& settings, const SafetySettings& safety, ClearanceQuery::Workspace& workspace,
                      bool measured, const RigidBodyDynamics* dynamics) {
   TimedPath route;
   route.limits = path_limits(body.robot().limits(), settings.speed * (measured ? 1.0 : unmeasured));

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "sidestep/attractor/clearance_barrier.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "support/allocations.hpp"
 #include "support/random_scene.hpp"
 
@@ -117,8 +117,8 @@ BOOST_AUTO_TEST_CASE(edges_that_are_free_can_be_held_all_along) {
     const HoldingTorque holding(dynamics, Eigen::VectorXd::Constant(nv, 25.0), 0.05);
     Body on_links = test::random_body(random, robot);
     on_links.levels = Eigen::VectorXd::Ones(on_links.num_components());
-    const BodyClearance body(robot, on_links, {}, {}, {}, holding);
-    BodyClearance::Workspace w(body);
+    const ClearanceQuery body(robot, on_links, {}, {}, {}, holding);
+    ClearanceQuery::Workspace w(body);
     KinematicState state(robot);
     const Margins none{0.0, 0.002, 0.3, {}};
     for (int edge = 0; edge < 20; ++edge) {
@@ -153,9 +153,9 @@ BOOST_AUTO_TEST_CASE(what_the_arm_cannot_hold_is_not_free) {
   const RigidBodyDynamics dynamics(robot, {{2.0, {0.5, 0.0, 0.0}, 0.01 * Eigen::Matrix3d::Identity()}});
   const Body body({"rod"}, Eigen::VectorXd::Ones(1), Eigen::Vector3d(0.5, 0.0, 0.0), {0.01 * Eigen::Matrix3d::Identity()},
                   Eigen::VectorXd::Ones(1));
-  const BodyClearance known(robot, body, {}, {}, {}, HoldingTorque(dynamics, Eigen::VectorXd::Constant(1, 6.0), 0.05));
-  const BodyClearance unknown(robot, body);
-  BodyClearance::Workspace w(known), v(unknown);
+  const ClearanceQuery known(robot, body, {}, {}, {}, HoldingTorque(dynamics, Eigen::VectorXd::Constant(1, 6.0), 0.05));
+  const ClearanceQuery unknown(robot, body);
+  ClearanceQuery::Workspace w(known), v(unknown);
   const auto at = [](double q) { return Eigen::VectorXd::Constant(1, q); };
   const Margins none{0.0, 0.002, 0.3, {}};
   BOOST_TEST(known.num_items() == 2);

@@ -57,8 +57,8 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
   if (goal) {
     controller.set_goal(*goal);
   }
-  const BodyClearance body(arm.robot(), arm.body());
-  BodyClearance::Workspace room(body);
+  const ClearanceQuery body(arm.robot(), arm.body());
+  ClearanceQuery::Workspace room(body);
   const SpeedLimitSettings limits = settings.speed_limits.value_or(SpeedLimitSettings{});
   Motion motion;
   Eigen::VectorXd q = start, v = Eigen::VectorXd::Zero(nv);

@@ -35,8 +35,8 @@ void check_limits(const PathTiming& m) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(a_rounded_corner_has_two_continuous_derivatives_and_meets_its_edges) {
-  const BodyClearance body = test::planar_arm_body();
-  BodyClearance::Workspace w(body);
+  const ClearanceQuery body = test::planar_arm_body();
+  ClearanceQuery::Workspace w(body);
   const RoundedPath path(corner(), body, Obstacles::none(), Margins{}, w);
   BOOST_TEST(path.length() == 1.0 + std::hypot(0.2, 1.0) + std::hypot(1.7, 0.6), boost::test_tools::tolerance(1e-12));
   BOOST_TEST(path.corners()[0].half == 0.5 * std::hypot(0.2, 1.0), boost::test_tools::tolerance(1e-12));
@@ -55,8 +55,8 @@ BOOST_AUTO_TEST_CASE(a_rounded_corner_has_two_continuous_derivatives_and_meets_i
 }
 
 BOOST_AUTO_TEST_CASE(a_corner_is_as_wide_as_obstacles_let_it) {
-  const BodyClearance body = test::planar_arm_body();
-  BodyClearance::Workspace w(body);
+  const ClearanceQuery body = test::planar_arm_body();
+  ClearanceQuery::Workspace w(body);
   Eigen::MatrixXd path(2, 3);
   path << 0.0, 2.0, 2.0, 2.0, 2.0, 0.0;
   const Eigen::Vector3d beside(0.37 * std::cos(1.786), 0.37 * std::sin(1.786), 0.0);  // nearer to the cut than to the edges
@@ -98,8 +98,8 @@ BOOST_AUTO_TEST_CASE(a_straight_motion_takes_what_its_limits_allow) {
 }
 
 BOOST_AUTO_TEST_CASE(corners_hold_the_limits_at_every_sample) {
-  const BodyClearance body = test::planar_arm_body();
-  BodyClearance::Workspace w(body);
+  const ClearanceQuery body = test::planar_arm_body();
+  ClearanceQuery::Workspace w(body);
   for (const double radius : {1.0, 0.05}) {  // 0.05: corners that the limit of jerk slows
     Eigen::MatrixXd path = corner();
     path *= radius;

@@ -63,7 +63,7 @@ Eigen::VectorXd joints(double first) { return Eigen::Vector3d(first, 0.0, 0.0); 
 
 BOOST_AUTO_TEST_CASE(goes_straight_where_that_is_free) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
   const Plan plan = planner.plan(joints(0.5), joints(1.5), wall(), 0);
   BOOST_TEST(name(plan.status) == "found");
@@ -73,9 +73,9 @@ BOOST_AUTO_TEST_CASE(goes_straight_where_that_is_free) {
 
 BOOST_AUTO_TEST_CASE(finds_a_free_way_around_and_the_same_every_time) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
-  BodyClearance::Workspace w(body);
+  ClearanceQuery::Workspace w(body);
   const Obstacles points = wall();
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Plan plan = planner.plan(joints(0.5), joints(-0.5), points, seed);
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(finds_a_free_way_around_and_the_same_every_time) {
 
 BOOST_AUTO_TEST_CASE(a_path_begins_anew_where_an_arm_is_that_has_moved_on) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
   const Obstacles points = wall();
   const Plan plan = planner.plan(joints(0.5), joints(-0.5), points, 0);
@@ -135,11 +135,11 @@ BOOST_AUTO_TEST_CASE(a_path_begins_anew_where_an_arm_is_that_has_moved_on) {
 
 BOOST_AUTO_TEST_CASE(smoothing_makes_a_path_shorter_and_wide_where_there_is_room) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   PlannerSettings settings;
   settings.margin = settings.floor = 0.01;
   RrtConnect planner(body, settings);
-  BodyClearance::Workspace w(body);
+  ClearanceQuery::Workspace w(body);
   const Obstacles points = wall();
   const auto least = [&](const Eigen::MatrixXd& path) {
     double clearance = 1.0;
@@ -171,7 +171,7 @@ BOOST_AUTO_TEST_CASE(smoothing_makes_a_path_shorter_and_wide_where_there_is_room
 
 BOOST_AUTO_TEST_CASE(says_what_is_in_the_way_and_how_deep) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot), {{"link0", "link2"}});
+  const ClearanceQuery body(robot, along_links(robot), {{"link0", "link2"}});
   RrtConnect planner(body, {});
   const Plan goal = planner.plan(joints(0.5), joints(0.0), wall(), 0);
   BOOST_TEST(name(goal.status) == "goal_in_collision");
@@ -193,8 +193,8 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_of_an_ellipsoid_is_as_deep_as_it_is_t
   const Robot robot = planar(1);
   const Eigen::Vector3d centre(0.0, 0.02, 0.02);
   const Eigen::Matrix3d shape = Eigen::Vector3d(0.0451, 0.025, 0.025).cwiseAbs2().asDiagonal();
-  const BodyClearance body(robot, Body({"link0"}, Eigen::VectorXd::Ones(1), centre, {shape}, Eigen::VectorXd::Ones(1)));
-  BodyClearance::Workspace w(body);
+  const ClearanceQuery body(robot, Body({"link0"}, Eigen::VectorXd::Ones(1), centre, {shape}, Eigen::VectorXd::Ones(1)));
+  ClearanceQuery::Workspace w(body);
   const Obstacles point = at(centre, 0.0);
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(1);
   Eigen::VectorXd found(1);
@@ -208,7 +208,7 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_of_an_ellipsoid_is_as_deep_as_it_is_t
 
 BOOST_AUTO_TEST_CASE(a_wider_way_is_taken_where_there_is_one) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
   int wider = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
@@ -231,9 +231,9 @@ BOOST_AUTO_TEST_CASE(a_wider_way_is_taken_where_there_is_one) {
 
 BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
-  BodyClearance::Workspace w(body);
+  ClearanceQuery::Workspace w(body);
   // A point 1 cm deep in the side of the last link at the goal: less than the allowance.
   Eigen::Matrix3Xd points(3, 1);
   points << 0.75, -0.03, 0.0;
@@ -250,7 +250,7 @@ BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
 
 BOOST_AUTO_TEST_CASE(what_is_no_longer_wanted_ends_with_what_there_is) {
   const Robot robot = planar(3);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   RrtConnect planner(body, {});
   const Plan first = planner.find(joints(0.5), joints(-0.5), wall(), 3);
   BOOST_TEST_REQUIRE(name(first.status) == "found");
@@ -269,7 +269,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_longer_wanted_ends_with_what_there_is) {
 
 BOOST_AUTO_TEST_CASE(a_closed_way_ends_with_the_budget) {
   const Robot robot = planar(1);
-  const BodyClearance body(robot, along_links(robot));
+  const ClearanceQuery body(robot, along_links(robot));
   Eigen::Matrix3Xd points(3, 2);
   points << 0.25, -0.25, 0.0, 0.0, 0.0, 0.0;
   PlannerSettings settings;

@@ -10,7 +10,7 @@ using namespace sidestep;
 
 namespace {
 
-const BodyClearance body = test::planar_arm_body();
+const ClearanceQuery body = test::planar_arm_body();
 const TimedPathSettings settings;
 
 Obstacles balls(const Eigen::Matrix3Xd& points) {
@@ -25,7 +25,7 @@ Eigen::MatrixXd line() {
 
 TimedPath route_of(const Eigen::MatrixXd& path, const Obstacles& obstacles, const Eigen::Vector2d& v = Eigen::Vector2d::Zero(),
                    bool measured = true) {
-  BodyClearance::Workspace w(body);
+  ClearanceQuery::Workspace w(body);
   return make_route(RoundedPath(path, body, obstacles, Margins{}, w), v, body, obstacles, settings, SafetySettings{}, w,
                     measured);
 }
@@ -56,7 +56,7 @@ BOOST_AUTO_TEST_CASE(no_joint_moves_on_for_long_while_it_stops) {
 }
 
 BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_safety_rows_let_it) {
-  BodyClearance::Workspace w(body);
+  ClearanceQuery::Workspace w(body);
   Eigen::MatrixXd path(2, 2);
   path << 0.0, 0.83, 0.0, 0.0;  // towards a ball beside the way, which is 1.6 cm off the ends of the links there
   const Obstacles obstacles = balls(Eigen::Vector3d(0.4 * std::cos(1.0), 0.4 * std::sin(1.0), 0.0));
@@ -176,7 +176,7 @@ BOOST_AUTO_TEST_CASE(a_path_asks_no_more_of_the_motors_than_they_have) {
   // Gravity along y takes 2.94 Nm of the second joint where it lies along x: there the least share is left.
   for (const double pull : {0.0, -9.81}) {
     const RigidBodyDynamics dynamics(robot, {link, link}, Eigen::Vector3d(0.0, pull, 0.0));
-    BodyClearance::Workspace w(body);
+    ClearanceQuery::Workspace w(body);
     const RoundedPath path(line(), body, Obstacles::none(), Margins{}, w);
     const TimedPath route =
         make_route(path, Eigen::Vector2d::Zero(), body, Obstacles::none(), settings, SafetySettings{}, w, true, &dynamics);

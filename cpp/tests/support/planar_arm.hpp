@@ -1,7 +1,7 @@
 #pragma once
 
 #include "sidestep/scene/obstacles.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep::test {
 
@@ -23,12 +23,12 @@ inline Robot planar_arm() {
 }
 
 /// A slim ellipsoid around each of its links.
-inline BodyClearance planar_arm_body() {
+inline ClearanceQuery planar_arm_body() {
   Eigen::Matrix3Xd means = Eigen::Matrix3Xd::Zero(3, 2);
   means.row(0).setConstant(0.15);
   const Eigen::Matrix3d shape = Eigen::Vector3d(0.16 * 0.16, 0.02 * 0.02, 0.02 * 0.02).asDiagonal();
-  return BodyClearance(planar_arm(),
-                       Body({"link", "tip"}, Eigen::VectorXd::Ones(2), means, {shape, shape}, Eigen::VectorXd::Ones(2)));
+  return ClearanceQuery(planar_arm(),
+                        Body({"link", "tip"}, Eigen::VectorXd::Ones(2), means, {shape, shape}, Eigen::VectorXd::Ones(2)));
 }
 
 }  // namespace sidestep::test

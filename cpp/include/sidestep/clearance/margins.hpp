@@ -5,14 +5,14 @@
 
 namespace sidestep {
 
-/// How far every item (see BodyClearance) must keep off at a configuration.
+/// How far every item (see ClearanceQuery) must keep off at a configuration.
 ///
 /// The margin is asked for at every configuration that is looked at, margin − slack is kept everywhere between them.
 /// Near an end of the motion where an item is nearer than the margin, by the deficit δ, it may be as near:
 ///
 ///     margin(q) = margin − max over ends of δ_end · max(0, 1 − motion(q − q_end) / fade),
 ///
-/// with motion() the bound of how far the item moves, see BodyClearance::motions().
+/// with motion() the bound of how far the item moves, see ClearanceQuery::motions().
 struct Margins {
   struct End {
     Eigen::VectorXd q;         ///< (nv)

@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/planning/path_rounding.hpp"
 #include "sidestep/planning/timed_path.hpp"
 
@@ -15,8 +15,8 @@ namespace sidestep {
 class KeptPath {
  public:
   /// Rounds a path (nv × W) that keeps `margins`. What `motion` is of is still the path before.
-  void replace(const Eigen::MatrixXd& waypoints, const Margins& margins, const BodyClearance& body, const Obstacles& obstacles,
-               BodyClearance::Workspace& w);
+  void replace(const Eigen::MatrixXd& waypoints, const Margins& margins, const ClearanceQuery& body, const Obstacles& obstacles,
+               ClearanceQuery::Workspace& w);
   /// Gives it another motion, with a number of its own.
   void time(TimedPath motion);
 
@@ -31,7 +31,7 @@ class KeptPath {
   /// The first waypoint beyond a length; not beyond the last.
   Eigen::Index waypoint_after(double station) const;
   /// Whether it is still free from a length on.
-  bool is_free_from(double station, const BodyClearance& body, const Obstacles& obstacles, BodyClearance::Workspace& w) const;
+  bool is_free_from(double station, const ClearanceQuery& body, const Obstacles& obstacles, ClearanceQuery::Workspace& w) const;
 
  private:
   Eigen::MatrixXd waypoints_;

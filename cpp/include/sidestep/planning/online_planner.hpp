@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/math/interruption.hpp"
 #include "sidestep/math/progress_monitor.hpp"
 #include "sidestep/planning/online_planner_settings.hpp"
@@ -42,7 +42,7 @@ const char* name(OnlinePlannerStatus status) noexcept;
 class OnlinePlanner {
  public:
   /// Throws std::invalid_argument that names the setting at fault.
-  OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& settings);
+  OnlinePlanner(ClearanceQuery body, const OnlinePlannerConfig& settings);
   ~OnlinePlanner();
   OnlinePlanner(const OnlinePlanner&) = delete;
   OnlinePlanner& operator=(const OnlinePlanner&) = delete;
@@ -107,7 +107,7 @@ class OnlinePlanner {
   using Counts = PlannerExchange::Counts;
   Counts counts() const { return exchange_.counts(); }
   const OnlinePlannerConfig& settings() const noexcept { return settings_; }
-  const BodyClearance& body() const noexcept { return body_; }
+  const ClearanceQuery& body() const noexcept { return body_; }
 
   using Answer = PlannerExchange::Answer;
   using Looked = PlannerExchange::Looked;
@@ -134,7 +134,7 @@ class OnlinePlanner {
   void watch_progress(const Answer& answer, ConstVectorRef q, double time, const Reference& reference) noexcept;
   OnlinePlannerStatus status(const Answer& answer, double time) const noexcept;
 
-  BodyClearance body_;
+  ClearanceQuery body_;
   OnlinePlannerConfig settings_;
   PlannerExchange exchange_;
 
@@ -148,7 +148,7 @@ class OnlinePlanner {
   std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;
   double looked_at_ = -std::numeric_limits<double>::infinity();  // time of the newest state that was looked at [s]
   double look_excess_ = 0.0;  // by which that look took longer by the machine's clock than by the steps' [s]
-  BodyClearance::Workspace here_;
+  ClearanceQuery::Workspace here_;
 
   // Of the planner's thread.
   PathKeeper keeper_;

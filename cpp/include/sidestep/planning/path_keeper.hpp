@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/math/interruption.hpp"
 #include "sidestep/planning/kept_path.hpp"
 #include "sidestep/planning/online_planner_settings.hpp"
@@ -28,7 +28,7 @@ class PathKeeper {
   static constexpr double usual_progress = 0.0202;
 
   /// All of them must outlive the keeper.
-  PathKeeper(const BodyClearance& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange);
+  PathKeeper(const ClearanceQuery& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange);
 
   /// Looks at a state, and answers where something changes. What is thrown costs this look alone, not the process.
   void look_at(const State& state) noexcept;
@@ -58,7 +58,7 @@ class PathKeeper {
   Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const { return body_.robot().limits().nearest_within(q); }
   void answer(const State& state, PlanStatus status);
 
-  const BodyClearance& body_;
+  const ClearanceQuery& body_;
   const OnlinePlannerConfig& settings_;
   PlannerExchange& exchange_;
   RrtConnect search_;
@@ -70,7 +70,7 @@ class PathKeeper {
   bool changed_ = false;  // the scene, since the path was last looked at
   bool improving_ = false, overtaken_ = false;
   std::uint64_t watched_scene_ = 0;
-  BodyClearance::Workspace watch_;  // as the search's is in use then
+  ClearanceQuery::Workspace watch_;  // as the search's is in use then
   double margin_, failed_at_ = 0.0;
   PlanStatus status_ = PlanStatus::no_path;
 };

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep {
 
@@ -23,8 +23,8 @@ class RoundedPath {
   /// Corners as wide as half of the neighbouring edges (all of it at an end) allow, halved until they are free: judged as
   /// edges are, on chords that no point of the arm leaves by more than half a millimetre. A corner that is free at no
   /// width keeps one at which it leaves the path by no more than that.
-  RoundedPath(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
-              BodyClearance::Workspace& workspace);
+  RoundedPath(const Eigen::MatrixXd& path, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
+              ClearanceQuery::Workspace& workspace);
 
   double length() const noexcept { return starts_.empty() ? 0.0 : starts_.back(); }
 
@@ -44,8 +44,8 @@ class RoundedPath {
   const std::vector<Corner>& corners() const noexcept { return corners_; }
 
  private:
-  bool corner_is_free(std::size_t k, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
-                      BodyClearance::Workspace& workspace) const;
+  bool corner_is_free(std::size_t k, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
+                      ClearanceQuery::Workspace& workspace) const;
 
   std::vector<Eigen::VectorXd> waypoints_, directions_;
   std::vector<double> starts_;   // stations of the waypoints

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sidestep/math/fields.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/planning/path_smoothing.hpp"
 #include "sidestep/planning/plan.hpp"
 #include "sidestep/math/random_stream.hpp"
@@ -55,7 +55,7 @@ const std::vector<Field<PlannerSettings>>& fields();
 class RrtConnect {
  public:
   /// The body must outlive the planner, which is mutable: one per thread.
-  RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
+  RrtConnect(const ClearanceQuery& body, const PlannerSettings& settings);
 
   /// A start or goal a rounding error outside the position limits is taken in: the path has the nearest one within.
   Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
@@ -69,8 +69,8 @@ class RrtConnect {
   void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
 
   const PlannerSettings& settings() const noexcept { return settings_; }
-  const BodyClearance& body() const noexcept { return *body_; }
-  BodyClearance::Workspace& workspace() noexcept { return workspace_; }
+  const ClearanceQuery& body() const noexcept { return *body_; }
+  ClearanceQuery::Workspace& workspace() noexcept { return workspace_; }
 
   /// Whether an item is deeper than its allowance inside something at q; then what.
   bool obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction);
@@ -107,9 +107,9 @@ class RrtConnect {
   Growth grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins,
               RandomStream& random);
 
-  const BodyClearance* body_;
+  const ClearanceQuery* body_;
   PlannerSettings settings_;
-  BodyClearance::Workspace workspace_;
+  ClearanceQuery::Workspace workspace_;
   std::int64_t nodes_looked_through_ = 0, work_before_ = 0;  // the latter: before the plan under way
   Interrupted interrupted_ = never_interrupted;
   SearchTree from_start_, from_goal_;

@@ -5,7 +5,7 @@
 #include "sidestep/constraints/safety_rows.hpp"
 #include "sidestep/math/fields.hpp"
 #include "sidestep/robot/dynamics.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/planning/path_timing.hpp"
 
 namespace sidestep {
@@ -50,8 +50,8 @@ struct TimedPath {
 /// gravity leaves, and their changes no more than 0.5 of the effort's rate: at a place with s̈, s⃛ what the joints' limits allow,
 ///     |M q'| s̈ share <= 0.7 (effort − |g|),     |M q'| s⃛ share_of_jerk <= 0.5 effort rate,
 /// the first with a share for each place (at least 0.05), the second with one for the path. Centrifugal forces are not counted.
-TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const BodyClearance& body, const Obstacles& obstacles,
-                     const TimedPathSettings& settings, const SafetySettings& safety, BodyClearance::Workspace& workspace,
+TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const ClearanceQuery& body, const Obstacles& obstacles,
+                     const TimedPathSettings& settings, const SafetySettings& safety, ClearanceQuery::Workspace& workspace,
                      bool measured = true, const RigidBodyDynamics* dynamics = nullptr);
 
 /// Where the reference is on a timed path: at a time of the motion, which goes more slowly as the reference gets ahead of the arm.

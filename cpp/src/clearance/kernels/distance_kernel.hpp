@@ -2,7 +2,7 @@
 
 #include "sidestep/scene/balls.hpp"
 
-// The inner loop of BodyClearance and DistanceField, once per instruction set. Plain arrays only, as in the kernels of
+// The inner loop of ClearanceQuery and DistanceField, once per instruction set. Plain arrays only, as in the kernels of
 // ClearanceField.
 namespace sidestep::kernels {
 

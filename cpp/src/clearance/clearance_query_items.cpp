@@ -4,7 +4,7 @@
 
 #include "../math/settings.hpp"
 #include "kernels/distance_kernel.hpp"
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/clearance/ellipsoid_gap.hpp"
 
 namespace sidestep {
@@ -27,14 +27,14 @@ kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matr
 
 }  // namespace
 
-BodyClearance::Found BodyClearance::look(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked,
-                                         Workspace& w) const noexcept {
+ClearanceQuery::Found ClearanceQuery::measure(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked,
+                                              Workspace& w) const noexcept {
   ++w.checks_;
   switch (item.source) {
     case ClearanceItem::Source::obstacles: break;
     case ClearanceItem::Source::pair: {
       const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
-      const double gap = look_at_pair(item, gap_asked, w);
+      const double gap = measure_pair(item, gap_asked, w);
       return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
     }
     case ClearanceItem::Source::table: {
@@ -46,13 +46,13 @@ BodyClearance::Found BodyClearance::look(const ClearanceItem& item, const Obstac
       const HoldingTorque& holding = *items_->holding();
       return {std::min(holding.value(holding.loads()[static_cast<std::size_t>(item.index)], state(w)), asked.cap), -1};
     }
-    case ClearanceItem::Source::plane: return {look_at_plane(item, asked.cap, w), -1};
+    case ClearanceItem::Source::plane: return {measure_plane(item, asked.cap, w), -1};
   }
-  return look_at_points(item, obstacles, asked, w);
+  return measure_obstacles(item, obstacles, asked, w);
 }
 
-BodyClearance::Found BodyClearance::look_at_points(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked,
-                                                   Workspace& w) const noexcept {
+ClearanceQuery::Found ClearanceQuery::measure_obstacles(const ClearanceItem& item, const Obstacles& obstacles,
+                                                        const Asked& asked, Workspace& w) const noexcept {
   const LinkEllipsoids& link = items_->links()[item.link];
   const Workspace::Pose& X = pose(w, link.joint);
   const auto bound = [&](const Eigen::Vector3d& place, double radius, double enough) {
@@ -108,7 +108,7 @@ BodyClearance::Found BodyClearance::look_at_points(const ClearanceItem& item, co
   return found;
 }
 
-double BodyClearance::look_at_pair(const ClearanceItem& item, const Asked& asked, const Workspace& w) const noexcept {
+double ClearanceQuery::measure_pair(const ClearanceItem& item, const Asked& asked, const Workspace& w) const noexcept {
   const auto first = static_cast<std::size_t>(item.link), second = static_cast<std::size_t>(item.other);
   const LinkEllipsoids &a = items_->links()[item.link], &b = items_->links()[item.other];
   double least = asked.cap;
@@ -159,7 +159,7 @@ double BodyClearance::look_at_pair(const ClearanceItem& item, const Asked& asked
   return least;
 }
 
-double BodyClearance::look_at_plane(const ClearanceItem& item, double cap, const Workspace& w) const noexcept {
+double ClearanceQuery::measure_plane(const ClearanceItem& item, double cap, const Workspace& w) const noexcept {
   const LinkEllipsoids& link = items_->links()[item.link];
   const PlaneClearances& plane = *items_->planes()[static_cast<std::size_t>(item.index)];
   const Workspace::Pose& X = pose(w, link.joint);

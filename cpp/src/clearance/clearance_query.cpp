@@ -1,4 +1,4 @@
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace sidestep {
 
-BodyClearance::BodyClearance(std::shared_ptr<const ClearanceItems> items) : items_(std::move(items)) {
+ClearanceQuery::ClearanceQuery(std::shared_ptr<const ClearanceItems> items) : items_(std::move(items)) {
   for (const Joint& joint : robot().joints()) {
     const Eigen::Vector3d& a = joint.axis;
     const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
@@ -19,7 +19,7 @@ BodyClearance::BodyClearance(std::shared_ptr<const ClearanceItems> items) : item
   }
 }
 
-BodyClearance::Workspace::Workspace(const BodyClearance& body)
+ClearanceQuery::Workspace::Workspace(const ClearanceQuery& body)
     : poses_(body.robot().joints().size()),
       centres_(static_cast<std::size_t>(body.items().links().size())),
       motions_(body.num_items()),
@@ -41,7 +41,7 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
   open_.resize(most_intervals * body.words());
 }
 
-void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
+void ClearanceQuery::place(ConstVectorRef q, Workspace& w) const noexcept {
   w.placed_ = q;
   w.state_is_old_ = true;
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
@@ -66,26 +66,26 @@ void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
   }
 }
 
-const KinematicState& BodyClearance::state(Workspace& w) const noexcept {
+const KinematicState& ClearanceQuery::state(Workspace& w) const noexcept {
   if (std::exchange(w.state_is_old_, false)) {
     w.state_.update(robot(), w.placed_, w.rest_);
   }
   return w.state_;
 }
 
-const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, int joint) const noexcept {
+const ClearanceQuery::Workspace::Pose& ClearanceQuery::pose(const Workspace& w, int joint) const noexcept {
   static const Workspace::Pose world{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
   return joint < 0 ? world : w.poses_[static_cast<std::size_t>(joint)];
 }
 
-BodyClearance::Nearest BodyClearance::nearest(ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                              Workspace& w) const noexcept {
+ClearanceQuery::Nearest ClearanceQuery::nearest(ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                                Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   Nearest nearest{cap};
   for (int i = 0; i < num_items(); ++i) {
-    const Found found = look((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
+    const Found found = measure((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
     if (found.clearance < nearest.clearance) {
       nearest = {found.clearance, i, found.point};
     }
@@ -93,21 +93,21 @@ BodyClearance::Nearest BodyClearance::nearest(ConstVectorRef q, const Obstacles&
   return nearest;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                              Workspace& w) const noexcept {
+ClearanceQuery::Nearest ClearanceQuery::nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                                Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
-  const Found found = look((*items_)[item], obstacles, {cap, infinity, -infinity}, w);
+  const Found found = measure((*items_)[item], obstacles, {cap, infinity, -infinity}, w);
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
-BodyClearance::Nearest BodyClearance::nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                                       Workspace& w) const noexcept {
+ClearanceQuery::Nearest ClearanceQuery::nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                                         Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   Nearest nearest{cap};
   for (int i = 0; i < num_items() && label(i).kind == CoordinateLabel::Kind::obstacle; ++i) {  // they come first
-    const Found found = look((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
+    const Found found = measure((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
     if (found.clearance < nearest.clearance) {
       nearest = {found.clearance, i, found.point};
     }
@@ -115,7 +115,7 @@ BodyClearance::Nearest BodyClearance::nearest_obstacle(ConstVectorRef q, const O
   return nearest;
 }
 
-double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept {
+double ClearanceQuery::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept {
   double nearest = infinity;
   if (!obstacles.tree().moves()) {
     return nearest;
@@ -132,17 +132,17 @@ double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacle
   return nearest;
 }
 
-void BodyClearance::clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
-                               Eigen::Ref<Eigen::VectorXd> out) const noexcept {
+void ClearanceQuery::clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
+                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   for (int i = 0; i < num_items(); ++i) {
-    out[i] = look((*items_)[i], obstacles, {cap, infinity, -infinity}, w).clearance;
+    out[i] = measure((*items_)[i], obstacles, {cap, infinity, -infinity}, w).clearance;
   }
 }
 
-double BodyClearance::room(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
-                           Workspace& w) const noexcept {
+double ClearanceQuery::distance_left(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near,
+                                     double cap, Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   double least = cap;
@@ -153,7 +153,7 @@ double BodyClearance::room(ConstVectorRef q, const Obstacles& obstacles, const E
     if (item.source == ClearanceItem::Source::load) {
       continue;
     }
-    const double found = look(item, obstacles, {least + floors[i], near + floors[i], floors[i]}, w).clearance - floors[i];
+    const double found = measure(item, obstacles, {least + floors[i], near + floors[i], floors[i]}, w).clearance - floors[i];
     if (found < least) {
       least = found;
       w.last_ = i;

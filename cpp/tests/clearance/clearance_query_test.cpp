@@ -1,5 +1,5 @@
 // Clearances against those of the barriers' field, and edges against a dense scan.
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <boost/test/unit_test.hpp>
@@ -47,8 +47,8 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
     const Body body = calibrated(random, robot, 0.05);
     const std::vector<LinkPair> pairs{{"link0", "link5"}, {"link1", "link4", -0.03}};
     const KeptPlane plane{Eigen::Vector3d(0.0, 0.0, -1.0), Eigen::Vector3d(0.1, 0.2, 1.0), {"link3", "link5"}};
-    const BodyClearance checked(robot, body, pairs, {plane});
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, body, pairs, {plane});
+    ClearanceQuery::Workspace w(checked);
     const Obstacles obstacles(2.0 * random.matrix(3, 40), Eigen::VectorXd::Constant(40, 0.01), Eigen::Matrix3Xd::Zero(3, 40));
     const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
     Eigen::VectorXd found(checked.num_items());
@@ -101,8 +101,8 @@ BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
         covariance = turn * semi_axes.cwiseAbs2().asDiagonal() * turn.transpose();
       }
       body = Body(body.links, body.weights, body.means, body.covariances, Eigen::VectorXd::Ones(body.num_components()));
-      const BodyClearance checked(robot, body);
-      BodyClearance::Workspace w(checked);
+      const ClearanceQuery checked(robot, body);
+      ClearanceQuery::Workspace w(checked);
       const int num = random.integer(1, 400);
       const double spread = random.magnitude(0.05, 3.0);
       const Obstacles obstacles(spread * random.matrix(3, num), 0.01 * random.vector(num).cwiseAbs(),
@@ -125,7 +125,7 @@ BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
           least = std::min(least, distance);
         }
       }
-      const BodyClearance::Nearest found = checked.nearest(q, obstacles, 20.0, w);
+      const ClearanceQuery::Nearest found = checked.nearest(q, obstacles, 20.0, w);
       BOOST_TEST(found.clearance <= least + 1e-5);  // single precision at some metres
       if (least > 0.0) {
         // two steps of Newton leave less than 1 % for such axes
@@ -142,8 +142,8 @@ BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
   for (int trial = 0; trial < 200; ++trial) {
     const Robot robot = test::random_tree(random, 6);
     const Body body = calibrated(random, robot, 0.05);
-    const BodyClearance checked(robot, body);
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, body);
+    ClearanceQuery::Workspace w(checked);
     const int nv = robot.num_coordinates();
     const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd b = (a + 0.2 * random.vector(nv)).cwiseMax(-3.0).cwiseMin(3.0);
@@ -186,8 +186,8 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
   int free = 0, blocked = 0, thin = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const Robot robot = test::random_tree(random, 5);
-    const BodyClearance checked(robot, calibrated(random, robot, 0.01), {{"link0", "link4"}});
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, calibrated(random, robot, 0.01), {{"link0", "link4"}});
+    ClearanceQuery::Workspace w(checked);
     const int nv = robot.num_coordinates();
     const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd b = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
@@ -231,8 +231,8 @@ BOOST_AUTO_TEST_CASE(an_edge_through_a_table_has_no_gap) {
     }
     ClearanceTable table{"link0", "link3", {ClearanceTable::Axis{0, -3.0, 0.5, false}, {nv - 1, -M_PI, M_PI / 4.0, true}}, {}};
     table.control = 0.03 * random.matrix(13, 8);
-    const BodyClearance checked(robot, body, {}, {}, {table});
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, body, {}, {}, {table});
+    ClearanceQuery::Workspace w(checked);
     const int item = checked.num_items() - 1;
     BOOST_TEST(checked.label(item).name == "link0");
     const Eigen::VectorXd a = random.vector(nv), b = a + 0.5 * random.vector(nv);
@@ -262,8 +262,8 @@ BOOST_AUTO_TEST_CASE(an_edge_keeps_margins_that_ease_at_its_ends) {
   int free = 0, blocked = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const Robot robot = test::random_tree(random, 4);
-    const BodyClearance checked(robot, calibrated(random, robot, 0.01));
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, calibrated(random, robot, 0.01));
+    ClearanceQuery::Workspace w(checked);
     const int nv = robot.num_coordinates();
     const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd b = (a + 0.3 * random.vector(nv)).cwiseMax(-3.0).cwiseMin(3.0);
@@ -305,8 +305,8 @@ BOOST_AUTO_TEST_CASE(an_edge_keeps_margins_that_ease_at_its_ends) {
 BOOST_AUTO_TEST_CASE(margins_ease_at_an_end_and_only_there) {
   Random random(4);
   const Robot robot = test::random_tree(random, 4);
-  const BodyClearance checked(robot, calibrated(random, robot, 0.02));
-  BodyClearance::Workspace w(checked);
+  const ClearanceQuery checked(robot, calibrated(random, robot, 0.02));
+  ClearanceQuery::Workspace w(checked);
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(robot.num_coordinates(), 0.3);
   const Obstacles obstacles(random.matrix(3, 1), Eigen::VectorXd::Zero(1), Eigen::Matrix3Xd::Zero(3, 1));
   const double clearance = checked.nearest(q, obstacles, 10.0, w).clearance;
@@ -321,8 +321,8 @@ BOOST_AUTO_TEST_CASE(margins_ease_at_an_end_and_only_there) {
 BOOST_AUTO_TEST_CASE(queries_allocate_nothing) {
   Random random(5);
   const Robot robot = test::random_tree(random, 6);
-  const BodyClearance checked(robot, calibrated(random, robot, 0.02), {{"link0", "link5"}});
-  BodyClearance::Workspace w(checked);
+  const ClearanceQuery checked(robot, calibrated(random, robot, 0.02), {{"link0", "link5"}});
+  ClearanceQuery::Workspace w(checked);
   const Obstacles obstacles = test::random_obstacles(random, 50);
   const Eigen::VectorXd a = random.vector(robot.num_coordinates()), b = -a;
   int answers = 0;
@@ -345,8 +345,8 @@ BOOST_AUTO_TEST_CASE(links_far_apart_are_free_whatever_their_contact) {
   const int nv = robot.num_coordinates();
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), b = Eigen::VectorXd::Constant(nv, 1e-3);
   for (int trial = 0; trial < 200; ++trial) {
-    const BodyClearance checked(robot, body, {{body.links.front(), body.links.back(), random.uniform(-0.08, -0.001)}});
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, body, {{body.links.front(), body.links.back(), random.uniform(-0.08, -0.001)}});
+    ClearanceQuery::Workspace w(checked);
     for (const double margin : {0.005, 0.0025, 0.02}) {
       const Margins margins{margin, 0.002, 0.3, {}};
       BOOST_TEST(checked.free(q, Obstacles::none(), margins, w));
@@ -359,8 +359,8 @@ BOOST_AUTO_TEST_CASE(links_far_apart_are_free_whatever_their_contact) {
 BOOST_AUTO_TEST_CASE(what_moves_is_nearer_than_it_is_said_to_be) {
   Random random(5);
   const Robot robot = test::random_tree(random, 6);
-  const BodyClearance body(robot, calibrated(random, robot, 0.05));
-  BodyClearance::Workspace w(body);
+  const ClearanceQuery body(robot, calibrated(random, robot, 0.05));
+  ClearanceQuery::Workspace w(body);
   constexpr double far = 10.0, time = 0.5, speed = 0.4;
   for (int trial = 0; trial < 200; ++trial) {
     const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
@@ -385,8 +385,8 @@ BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
   Random random(11);
   for (int trial = 0; trial < 60; ++trial) {
     const Robot robot = test::random_tree(random, 6);
-    const BodyClearance checked(robot, calibrated(random, robot, 0.05), {{"link0", "link5"}, {"link1", "link4", -0.03}});
-    BodyClearance::Workspace w(checked);
+    const ClearanceQuery checked(robot, calibrated(random, robot, 0.05), {{"link0", "link5"}, {"link1", "link4", -0.03}});
+    ClearanceQuery::Workspace w(checked);
     const Obstacles obstacles(2.0 * random.matrix(3, 40), Eigen::VectorXd::Constant(40, 0.01), Eigen::Matrix3Xd::Zero(3, 40));
     const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd floors = 0.05 * random.vector(checked.num_items());
@@ -394,14 +394,14 @@ BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
     constexpr double cap = 0.5, far = 1.0;  // the room is never more than the cap, whatever the floors
     checked.clearances(q, obstacles, far, w, clearances);
     const double least = std::min(cap, (clearances - floors).minCoeff());
-    const double room = checked.room(q, obstacles, floors, cap, cap, w);
+    const double room = checked.distance_left(q, obstacles, floors, cap, cap, w);
     if (least >= 0.0) {
       BOOST_TEST(std::abs(room - least) < 1e-12);
     } else {
       BOOST_TEST(room < 0.0);
     }
     constexpr double near = 0.05;
-    const double rough = checked.room(q, obstacles, floors, near, cap, w);
+    const double rough = checked.distance_left(q, obstacles, floors, near, cap, w);
     BOOST_TEST(rough <= room + 1e-12);
     BOOST_TEST((rough >= near || std::abs(rough - room) < 1e-12 || room < 0.0));
   }

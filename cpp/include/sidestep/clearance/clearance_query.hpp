@@ -16,13 +16,14 @@
 
 namespace sidestep {
 
-/// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no
-/// derivative.
+/// How near an arm is to all that it must keep apart from, see ClearanceItems, in three forms:
 ///
-/// What must keep apart are items: a link and the obstacles, a link and a plane, two links, what a joint holds and its effort limit. The clearances of planes
-/// and pairs are those of PlaneBarrier and SelfCollisionBarrier, or of ClearanceTableBarrier; that of obstacles is the
-/// distance of their balls from the ellipsoids, signed, by two steps of Newton towards the nearest place: a lower
-/// bound, as a supporting plane gives it.
+///   nearest           at a configuration, by positions alone: `nearest`, `clearances`, `distance_left`, `free`;
+///   along an edge     everywhere between two configurations: `edge_free`;
+///   with derivatives  at a state, for barriers: ClearanceGroup::evaluate of a group of `items()`.
+///
+/// The first two agree with the third but for the clearance of obstacles, which is the distance of their balls from the ellipsoids,
+/// signed, by two steps of Newton towards the nearest place: a lower bound, as a supporting plane gives it.
 ///
 /// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther
 /// than
@@ -31,17 +32,18 @@ namespace sidestep {
 ///
 /// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where
 /// the motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with the steepest slopes for R;
-/// of what a joint holds both, with its slope along the edge for v and bounds of the derivatives. An interval of an edge is free as far around its middle as the
-/// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
-class BodyClearance {
+/// of what a joint holds both, with its slope along the edge for v and bounds of the derivatives. An interval of an edge is
+/// free as far around its middle as the clearance there exceeds the smaller of the two; what is left to either side is
+/// checked in the same way.
+class ClearanceQuery {
  public:
-  explicit BodyClearance(std::shared_ptr<const ClearanceItems> items);
+  explicit ClearanceQuery(std::shared_ptr<const ClearanceItems> items);
   /// Of items of its own, see ClearanceItems.
-  BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
-                const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
-                std::optional<HoldingTorque> holding = std::nullopt)
-      : BodyClearance(std::make_shared<const ClearanceItems>(std::move(robot), body, pairs, planes, std::move(tables),
-                                                             std::move(holding))) {}
+  ClearanceQuery(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
+                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
+                 std::optional<HoldingTorque> holding = std::nullopt)
+      : ClearanceQuery(std::make_shared<const ClearanceItems>(std::move(robot), body, pairs, planes, std::move(tables),
+                                                              std::move(holding))) {}
 
   const Robot& robot() const noexcept { return items_->robot(); }
   const ClearanceItems& items() const noexcept { return *items_; }
@@ -52,7 +54,7 @@ class BodyClearance {
   /// What changes in a query; one per thread.
   class Workspace {
    public:
-    explicit Workspace(const BodyClearance& body);
+    explicit Workspace(const ClearanceQuery& body);
 
     /// How many clearances of single items were asked for: the work done, the same on every machine.
     std::int64_t checks() const noexcept { return checks_; }
@@ -63,7 +65,7 @@ class BodyClearance {
     }
 
    private:
-    friend class BodyClearance;
+    friend class ClearanceQuery;
     struct Pose {
       Eigen::Matrix3d R;
       Eigen::Vector3d p;
@@ -110,8 +112,8 @@ class BodyClearance {
 
   /// The least of what the clearances have beyond `floors` (num_items), not above `cap` [m]; where it is more than `near`, a lower
   /// bound. Any of what joints hold counts as far. Ends below zero.
-  double room(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
-              Workspace& w) const noexcept;
+  double distance_left(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
+                       Workspace& w) const noexcept;
 
   /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls
   /// around the links; infinity where all are at rest.
@@ -163,10 +165,11 @@ class BodyClearance {
   struct Asked {
     double cap, near, stop;
   };
-  Found look(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  Found look_at_points(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  double look_at_pair(const ClearanceItem& item, const Asked& asked, const Workspace& w) const noexcept;
-  double look_at_plane(const ClearanceItem& item, double cap, const Workspace& w) const noexcept;
+  Found measure(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  Found measure_obstacles(const ClearanceItem& item, const Obstacles& obstacles, const Asked& asked,
+                          Workspace& w) const noexcept;
+  double measure_pair(const ClearanceItem& item, const Asked& asked, const Workspace& w) const noexcept;
+  double measure_plane(const ClearanceItem& item, double cap, const Workspace& w) const noexcept;
   double margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept;
 
   std::shared_ptr<const ClearanceItems> items_;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/clearance/clearance_query.hpp"
 
 namespace sidestep {
 namespace {
@@ -31,7 +31,7 @@ struct Motion {
 
 }  // namespace
 
-void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
+void ClearanceQuery::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
     const Joint& joint = robot().joints()[i];
     const Workspace::Pose& parent = pose(w, joint.parent);
@@ -43,7 +43,7 @@ void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   }
 }
 
-double BodyClearance::speed(const ClearanceItem& item, Workspace& w) const noexcept {
+double ClearanceQuery::speed(const ClearanceItem& item, Workspace& w) const noexcept {
   if (item.source == ClearanceItem::Source::load) {
     const HoldingTorque& holding = *items_->holding();
     static_cast<void>(holding.at(holding.loads()[static_cast<std::size_t>(item.index)], state(w), w.gradient_));
@@ -67,7 +67,7 @@ double BodyClearance::speed(const ClearanceItem& item, Workspace& w) const noexc
   return sum;
 }
 
-void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept {
+void ClearanceQuery::bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept {
   const Eigen::Index nv = displacement.size();
   w.difference_ = displacement;
   w.lengths_ = displacement.cwiseAbs();
@@ -78,7 +78,7 @@ void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) con
   w.curvatures_.noalias() = items_->bends() * w.products_;
 }
 
-double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept {
+double ClearanceQuery::motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept {
   place(q, w);
   bound_motions(displacement, w);
   move(displacement, w);
@@ -86,7 +86,7 @@ double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displace
   return moved.distance(1.0);
 }
 
-double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept {
+double ClearanceQuery::margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept {
   double lowered = 0.0;
   for (const Margins::End& end : margins.ends) {
     const double deficit = end.deficits[item];
@@ -99,7 +99,7 @@ double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margi
   return margin(item, margins) - lowered;
 }
 
-bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
+bool ClearanceQuery::free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
   if (!q.allFinite()) {
     return false;
   }
@@ -110,7 +110,7 @@ bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Mar
     // In the order of the items, but the one that was in the way last before all.
     const int i = k == 0 ? w.last_ : (k <= w.last_ ? k - 1 : k);
     const double margin = margin_at(i, q, margins, slope);
-    if (look((*items_)[i], obstacles, {margin, margin, margin}, w).clearance < margin) {
+    if (measure((*items_)[i], obstacles, {margin, margin, margin}, w).clearance < margin) {
       w.last_ = i;
       return false;
     }
@@ -118,8 +118,8 @@ bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Mar
   return true;
 }
 
-bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
-                              Workspace& w) const noexcept {
+bool ClearanceQuery::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
+                               Workspace& w) const noexcept {
   w.difference_ = b - a;
   if (!a.allFinite() || !w.difference_.allFinite()) {
     return false;
@@ -148,7 +148,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacle
         const double least = margin_at(i, w.q_, margins, slope);
         const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};
         const double slack_here = slack(i, margins), enough = least - slack_here + moved.distance(at.half);
-        const double clearance = look(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
+        const double clearance = measure(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
         if (clearance < least) {
           w.last_ = i;
           return false;
