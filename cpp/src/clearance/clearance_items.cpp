@@ -41,7 +41,7 @@ ClearanceItem::ClearanceItem(Source from, int number, CoordinateLabel what, Eige
 
 ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
                                const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables,
-                               std::optional<HoldingTorque> holding, double temperature)
+                               std::optional<GravityTorqueLimit> gravity_torque, double temperature)
     : robot_(std::move(robot)),
       links_(std::make_shared<BodyLinks>(robot_, body, items_owner)),
       obstacles_(std::make_shared<ClearanceField>(robot_, body, temperature)) {
@@ -54,8 +54,8 @@ ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<
   if (!tables.empty()) {
     tables_ = std::make_shared<TableClearances>(robot_, std::move(tables), items_owner);
   }
-  if (holding) {
-    holding_ = std::make_shared<HoldingTorque>(*std::move(holding));
+  if (gravity_torque) {
+    gravity_torque_ = std::make_shared<GravityTorqueLimit>(*std::move(gravity_torque));
   }
   add_obstacles();
   add_pairs();
@@ -152,9 +152,9 @@ void ClearanceItems::add_tables() {
 }
 
 void ClearanceItems::add_loads() {
-  for (int k = 0; holding_ && k < holding_->size(); ++k) {
-    const HoldingTorque::Load& load = holding_->loads()[static_cast<std::size_t>(k)];
-    ClearanceItem& item = items_.emplace_back(Source::load, k, holding_->label(k), robot_.num_coordinates());
+  for (int k = 0; gravity_torque_ && k < gravity_torque_->size(); ++k) {
+    const GravityTorqueLimit::Load& load = gravity_torque_->loads()[static_cast<std::size_t>(k)];
+    ClearanceItem& item = items_.emplace_back(Source::load, k, gravity_torque_->label(k), robot_.num_coordinates());
     item.reach = load.steepest;
     item.bend = load.bend;
     item.most_margin = ClearanceGroup::margin_share * load.activation;

@@ -45,8 +45,8 @@ void ClearanceQuery::move(ConstVectorRef velocity, Workspace& w) const noexcept 
 
 double ClearanceQuery::speed(const ClearanceItem& item, Workspace& w) const noexcept {
   if (item.source == ClearanceItem::Source::load) {
-    const HoldingTorque& holding = *items_->holding();
-    static_cast<void>(holding.at(holding.loads()[static_cast<std::size_t>(item.index)], state(w), w.gradient_));
+    const GravityTorqueLimit& gravity_torque = *items_->gravity_torque();
+    static_cast<void>(gravity_torque.at(gravity_torque.loads()[static_cast<std::size_t>(item.index)], state(w), w.gradient_));
     return std::abs(w.gradient_.dot(w.difference_));
   }
   if (item.source == ClearanceItem::Source::table) {

@@ -43,8 +43,9 @@ ClearanceQuery::Found ClearanceQuery::measure(const ClearanceItem& item, const O
       return {std::min(clearance, asked.cap), -1};
     }
     case ClearanceItem::Source::load: {
-      const HoldingTorque& holding = *items_->holding();
-      return {std::min(holding.value(holding.loads()[static_cast<std::size_t>(item.index)], state(w)), asked.cap), -1};
+      const GravityTorqueLimit& gravity_torque = *items_->gravity_torque();
+      return {std::min(gravity_torque.value(gravity_torque.loads()[static_cast<std::size_t>(item.index)], state(w)), asked.cap),
+              -1};
     }
     case ClearanceItem::Source::plane: return {measure_plane(item, asked.cap, w), -1};
   }

@@ -21,13 +21,13 @@ constexpr double default_look_period = 0.02;  // period of looks at places where
 
 /// All that must keep apart; what joints hold only of an arm moved by torque, as far as effort margins leave it.
 std::shared_ptr<const ClearanceItems> make_items(const Arm& arm, const ControllerSettings& settings, bool torque) {
-  std::optional<HoldingTorque> holding;
+  std::optional<GravityTorqueLimit> gravity_torque;
   if (torque && arm.has_dynamics()) {
     const Eigen::VectorXd effort = (1.0 - settings.effort_margin) * arm.robot().limits().effort;
-    holding.emplace(arm.dynamics(), effort, settings.barriers.self_activation);
+    gravity_torque.emplace(arm.dynamics(), effort, settings.barriers.self_activation);
   }
   return std::make_shared<const ClearanceItems>(arm.robot(), arm.body(), arm.pairs(), std::vector<KeptPlane>{}, arm.tables(),
-                                                std::move(holding), settings.barriers.temperature);
+                                                std::move(gravity_torque), settings.barriers.temperature);
 }
 
 std::shared_ptr<const GeometricSystem> make_system(const ClearanceItems& items, const BarrierSettings& b) {
@@ -47,7 +47,7 @@ std::shared_ptr<const GeometricSystem> make_system(const ClearanceItems& items, 
   const BarrierFunction self{b.self_activation, b.self_strength, b.power, b.floor};
   add(items.tables(), self);
   add(items.pairs(), self);
-  add(items.holding(), self);
+  add(items.gravity_torque(), self);
   GeometricSystemSettings settings;
   settings.stiffness = b.stiffness * Eigen::MatrixXd::Identity(nv, nv);
   settings.damping = b.damping * Eigen::MatrixXd::Identity(nv, nv);

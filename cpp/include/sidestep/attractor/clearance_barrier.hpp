@@ -6,7 +6,7 @@
 
 #include "sidestep/attractor/barrier.hpp"
 #include "sidestep/clearance/clearance_field.hpp"
-#include "sidestep/clearance/holding_torque.hpp"
+#include "sidestep/clearance/gravity_torque_limit.hpp"
 #include "sidestep/clearance/pair_clearances.hpp"
 #include "sidestep/clearance/plane_clearances.hpp"
 #include "sidestep/clearance/table_clearances.hpp"

@@ -10,7 +10,7 @@
 #include "sidestep/body/link_pair.hpp"
 #include "sidestep/clearance/clearance_field.hpp"
 #include "sidestep/clearance/coordinate_label.hpp"
-#include "sidestep/clearance/holding_torque.hpp"
+#include "sidestep/clearance/gravity_torque_limit.hpp"
 #include "sidestep/clearance/link_ellipsoids.hpp"
 #include "sidestep/clearance/pair_clearances.hpp"
 #include "sidestep/clearance/plane_clearances.hpp"
@@ -55,7 +55,8 @@ class ClearanceItems {
   /// joint moves it, a pair, plane or table is at fault, a name is unknown, or a prismatic joint has no limits.
   ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                  const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
-                 std::optional<HoldingTorque> holding = std::nullopt, double temperature = PairClearances::default_temperature);
+                 std::optional<GravityTorqueLimit> gravity_torque = std::nullopt,
+                 double temperature = PairClearances::default_temperature);
 
   const Robot& robot() const noexcept { return robot_; }
   const BodyLinks& links() const noexcept { return *links_; }
@@ -68,7 +69,7 @@ class ClearanceItems {
   const std::shared_ptr<const PairClearances>& pairs() const noexcept { return pairs_; }
   const std::vector<std::shared_ptr<const PlaneClearances>>& planes() const noexcept { return planes_; }
   const std::shared_ptr<const TableClearances>& tables() const noexcept { return tables_; }
-  const std::shared_ptr<const HoldingTorque>& holding() const noexcept { return holding_; }
+  const std::shared_ptr<const GravityTorqueLimit>& gravity_torque() const noexcept { return gravity_torque_; }
 
   /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
   const Eigen::VectorXd& reach() const noexcept { return reach_; }
@@ -91,7 +92,7 @@ class ClearanceItems {
   std::shared_ptr<const PairClearances> pairs_;
   std::vector<std::shared_ptr<const PlaneClearances>> planes_;
   std::shared_ptr<const TableClearances> tables_;
-  std::shared_ptr<const HoldingTorque> holding_;
+  std::shared_ptr<const GravityTorqueLimit> gravity_torque_;
   std::vector<ClearanceItem> items_;
   Eigen::VectorXd reach_;
   Eigen::MatrixXd reaches_, bends_;

@@ -41,9 +41,9 @@ class ClearanceQuery {
   /// Of items of its own, see ClearanceItems.
   ClearanceQuery(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                  const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
-                 std::optional<HoldingTorque> holding = std::nullopt)
+                 std::optional<GravityTorqueLimit> gravity_torque = std::nullopt)
       : ClearanceQuery(std::make_shared<const ClearanceItems>(std::move(robot), body, pairs, planes, std::move(tables),
-                                                              std::move(holding))) {}
+                                                              std::move(gravity_torque))) {}
 
   const Robot& robot() const noexcept { return items_->robot(); }
   const ClearanceItems& items() const noexcept { return *items_; }

@@ -13,7 +13,7 @@ struct CoordinateLabel {
     self,         ///< two links of the robot
     plane,        ///< a link against a plane
     joint_limit,  ///< a joint against a position limit; the clearance is in the joint's unit
-    effort,       ///< what a joint holds of the arm against its effort limit, see HoldingTorque
+    effort,       ///< what a joint holds of the arm against its effort limit, see GravityTorqueLimit
   };
   Kind kind = Kind::potential;
   std::string name = {};                                    ///< of the link, or of the coordinate for limits

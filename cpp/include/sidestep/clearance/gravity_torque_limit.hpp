@@ -14,11 +14,11 @@ namespace sidestep {
 /// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a sliding joint it is a share of
 /// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below. It is no clearance from
 /// anything, so that Clearances::least says nothing of it.
-class HoldingTorque final : public ClearanceGroup {
+class GravityTorqueLimit final : public ClearanceGroup {
  public:
   /// Of the joints that may come nearer to their limit than an activation distance of `most` [m] in any configuration; of the others
   /// none can. `effort` (nv) [Nm | N] may be infinite.
-  HoldingTorque(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most);
+  GravityTorqueLimit(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most);
 
   /// What a joint holds, or several that share a coordinate.
   struct Load {
@@ -43,10 +43,10 @@ class HoldingTorque final : public ClearanceGroup {
   double longest_activation(int k) const noexcept override { return loads_[static_cast<std::size_t>(k)].activation; }
 
   /// h [m]; its gradient into `gradient` (nv), its rate and its curvature at q̈ = 0. No allocation.
-  struct Room {
+  struct DistanceLeft {
     double value, rate, curvature;
   };
-  Room at(const Load& load, const KinematicState& state, Eigen::Ref<Eigen::VectorXd> gradient) const noexcept;
+  DistanceLeft at(const Load& load, const KinematicState& state, Eigen::Ref<Eigen::VectorXd> gradient) const noexcept;
   /// h alone [m].
   double value(const Load& load, const KinematicState& state) const noexcept;
 

@@ -1,4 +1,4 @@
-#include "sidestep/clearance/holding_torque.hpp"
+#include "sidestep/clearance/gravity_torque_limit.hpp"
 
 #include <cmath>
 #include <initializer_list>
@@ -29,7 +29,7 @@ double farthest_place(const Robot& robot, const Joint& joint) noexcept {
 
 }  // namespace
 
-HoldingTorque::HoldingTorque(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most)
+GravityTorqueLimit::GravityTorqueLimit(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most)
     : robot_(dynamics.robot()), inertials_(dynamics.inertials()), gravity_(dynamics.gravity()) {
   const std::vector<Joint>& joints = robot_.joints();
   const auto num = joints.size();
@@ -102,7 +102,7 @@ HoldingTorque::HoldingTorque(const RigidBodyDynamics& dynamics, const Eigen::Vec
   }
 }
 
-double HoldingTorque::value(const Load& load, const KinematicState& state) const noexcept {
+double GravityTorqueLimit::value(const Load& load, const KinematicState& state) const noexcept {
   double torque = 0.0;
   for (const Load::Carrier& carrier : load.carriers) {
     const SpatialMotion& S = state.link(carrier.joint).screw;
@@ -116,8 +116,8 @@ double HoldingTorque::value(const Load& load, const KinematicState& state) const
   return (load.effort - std::abs(torque)) / load.weight;
 }
 
-HoldingTorque::Room HoldingTorque::at(const Load& load, const KinematicState& state,
-                                      Eigen::Ref<Eigen::VectorXd> gradient) const noexcept {
+GravityTorqueLimit::DistanceLeft GravityTorqueLimit::at(const Load& load, const KinematicState& state,
+                                                        Eigen::Ref<Eigen::VectorXd> gradient) const noexcept {
   // With the screw (ω, u) of the joint, what it carries, of mass m and moment c = Σ m x about the world origin, takes the torque
   //     g = −ω · (c × γ) − m u · γ,   γ gravity.
   // Where link V carries a screw, that changes by V × S, and a body's x by V.linear + V.angular × x.
@@ -161,19 +161,19 @@ HoldingTorque::Room HoldingTorque::at(const Load& load, const KinematicState& st
   return {(load.effort - std::abs(torque)) / load.weight, gradient.dot(state.v()), per * curvature};
 }
 
-void HoldingTorque::evaluate(const KinematicState& state, const Obstacles& /*obstacles*/, double /*reach*/,
-                             const Horizon& ahead, ClearanceView out) const noexcept {
+void GravityTorqueLimit::evaluate(const KinematicState& state, const Obstacles& /*obstacles*/, double /*reach*/,
+                                  const Horizon& ahead, ClearanceView out) const noexcept {
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    const Room room = at(loads_[i], state, out.gradients.col(k));
+    const DistanceLeft left = at(loads_[i], state, out.gradients.col(k));
     const double within = std::min(ahead.distance, loads_[i].activation);
-    if (!(room.value < within) && !(room.value + ahead.time * room.rate < within)) {
+    if (!(left.value < within) && !(left.value + ahead.time * left.rate < within)) {
       continue;
     }
     const auto write = [&](ClearanceStateView& to) {
-      to.values[k] = room.value;
-      to.rates[k] = room.rate;
-      to.curvatures[k] = room.curvature;
+      to.values[k] = left.value;
+      to.rates[k] = left.rate;
+      to.curvatures[k] = left.curvature;
     };
     write(out);
     write(out.approach);
@@ -182,7 +182,7 @@ void HoldingTorque::evaluate(const KinematicState& state, const Obstacles& /*obs
   }
 }
 
-CoordinateLabel HoldingTorque::label(int k) const {
+CoordinateLabel GravityTorqueLimit::label(int k) const {
   const int coordinate = loads_[static_cast<std::size_t>(k)].coordinate;
   return {CoordinateLabel::Kind::effort, robot_.coordinate_names()[static_cast<std::size_t>(coordinate)]};
 }
