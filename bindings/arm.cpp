@@ -130,7 +130,7 @@ void bind_arm(nb::module_& m) {
   nb::class_<Arm>(m, "Arm", nb::is_weak_referenceable(), "Everything that is prepared once for a robot, in the core.")
       .def(
           "__init__",
-          [](Arm* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+          [](Arm* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<PairDistanceTable> tables,
              std::vector<Inertial> inertials, std::vector<CoverProof> proof,
              std::vector<std::pair<std::string, std::string>> allowed_pairs, const Provenance& provenance) {
             new (self) Arm(robot, body, link_pairs(pairs), std::move(tables), std::move(inertials),

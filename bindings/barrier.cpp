@@ -152,7 +152,7 @@ void bind_embedding(nb::module_& m) {
           nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
           nb::arg("temperature") = 0.002, nb::arg("reach") = 0.0);
 
-  nb::class_<ClearanceTable>(
+  nb::class_<PairDistanceTable>(
       m, "ClearanceTable",
       "The clearance h [m] of two links that only two coordinates x, y [rad | m] move relative to each other, as a\n"
       "function of these: a uniform cubic B-spline in either, h(x, y) = sum_ij B_i(x) B_j(y) control[i, j]. Control\n"
@@ -161,10 +161,10 @@ void bind_embedding(nb::module_& m) {
       "each; control (n, m) [m], at least 4 each. Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](ClearanceTable* self, std::string first, std::string second, std::array<int, 2> coordinates,
+          [](PairDistanceTable* self, std::string first, std::string second, std::array<int, 2> coordinates,
              std::array<double, 2> begin, std::array<double, 2> spacing, std::array<bool, 2> periodic,
              const ArrayLike& control) {
-            new (self) ClearanceTable{std::move(first), std::move(second),
+            new (self) PairDistanceTable{std::move(first), std::move(second),
                                       {{{coordinates[0], begin[0], spacing[0], periodic[0]},
                                         {coordinates[1], begin[1], spacing[1], periodic[1]}}},
                                       as_matrix(control, "control", -1, -1)};
@@ -172,32 +172,32 @@ void bind_embedding(nb::module_& m) {
           },
           nb::arg("first"), nb::arg("second"), nb::kw_only(), nb::arg("coordinates"), nb::arg("begin"),
           nb::arg("spacing"), nb::arg("periodic"), nb::arg("control"))
-      .def_ro("first", &ClearanceTable::first)
-      .def_ro("second", &ClearanceTable::second)
+      .def_ro("first", &PairDistanceTable::first)
+      .def_ro("second", &PairDistanceTable::second)
       .def_prop_ro("coordinates",
-                   [](const ClearanceTable& t) { return std::pair(t.axes[0].coordinate, t.axes[1].coordinate); })
-      .def_prop_ro("begin", [](const ClearanceTable& t) { return std::pair(t.axes[0].begin, t.axes[1].begin); })
-      .def_prop_ro("spacing", [](const ClearanceTable& t) { return std::pair(t.axes[0].spacing, t.axes[1].spacing); })
+                   [](const PairDistanceTable& t) { return std::pair(t.axes[0].coordinate, t.axes[1].coordinate); })
+      .def_prop_ro("begin", [](const PairDistanceTable& t) { return std::pair(t.axes[0].begin, t.axes[1].begin); })
+      .def_prop_ro("spacing", [](const PairDistanceTable& t) { return std::pair(t.axes[0].spacing, t.axes[1].spacing); })
       .def_prop_ro("periodic",
-                   [](const ClearanceTable& t) { return std::pair(t.axes[0].periodic, t.axes[1].periodic); })
-      .def_prop_ro("control", [](const ClearanceTable& t) { return to_numpy_matrix(t.control); }, "(n, m) [m].")
+                   [](const PairDistanceTable& t) { return std::pair(t.axes[0].periodic, t.axes[1].periodic); })
+      .def_prop_ro("control", [](const PairDistanceTable& t) { return to_numpy_matrix(t.control); }, "(n, m) [m].")
       .def(
           "at",
-          [](const ClearanceTable& t, double x, double y) {
-            const ClearanceTable::Sample h = t.at(x, y);
+          [](const PairDistanceTable& t, double x, double y) {
+            const PairDistanceTable::Sample h = t.at(x, y);
             return std::tuple(h.value, to_numpy(h.gradient), to_numpy_matrix(h.hessian));
           },
           nb::arg("x"), nb::arg("y"), "h [m], its gradient (2,) and Hessian (2, 2) by x and y.");
 
-  nb::class_<ClearanceTableBarrier, Embedding>(
+  nb::class_<PairDistanceTableBarrier, Embedding>(
       m, "ClearanceTableBarrier",
       "One coordinate per table, a barrier of the clearance it holds: self-collision of links with two joints between\n"
       "them, see sidestep.arm.clearance_tables. Other parameters as in ClearanceBarrier.")
       .def(
           "__init__",
-          [](ClearanceTableBarrier* self, const Robot& robot, std::vector<ClearanceTable> tables, double activation,
+          [](PairDistanceTableBarrier* self, const Robot& robot, std::vector<PairDistanceTable> tables, double activation,
              double strength, double power, double floor, double reach) {
-            new (self) ClearanceTableBarrier(robot, std::move(tables), {activation, strength, power, floor}, reach);
+            new (self) PairDistanceTableBarrier(robot, std::move(tables), {activation, strength, power, floor}, reach);
           },
           nb::arg("robot"), nb::arg("tables"), nb::kw_only(), nb::arg("activation") = 0.05, nb::arg("strength") = 0.02,
           nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("reach") = 0.0);

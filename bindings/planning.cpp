@@ -23,7 +23,7 @@ namespace {
 /// A planner with the body it searches for.
 class PathPlanner {
  public:
-  PathPlanner(const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+  PathPlanner(const Robot& robot, const Body& body, const Pairs& pairs, std::vector<PairDistanceTable> tables,
               const PlannerSettings& settings)
       : body_(robot, body, link_pairs(pairs), {}, std::move(tables)), planner_(body_, settings) {}
   PathPlanner(const PathPlanner&) = delete;
@@ -141,7 +141,7 @@ void bind_guide(nb::module_& m) {
       "Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](OnlinePlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+          [](OnlinePlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<PairDistanceTable> tables,
              const std::optional<PlannerSettings>& planner, const std::optional<TimedPathSettings>& route, double period,
              double patience, double retry, double tolerance, double duration, std::uint64_t seed, bool synchronous) {
             check_fitted_to(robot, body);
@@ -151,7 +151,7 @@ void bind_guide(nb::module_& m) {
             new (self) OnlinePlanner(ClearanceQuery(robot, body, link_pairs(pairs), {}, std::move(tables)), s);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
-          nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("planner") = nb::none(),
+          nb::arg("tables") = std::vector<PairDistanceTable>{}, nb::arg("planner") = nb::none(),
           nb::arg("route") = nb::none(), nb::arg("period") = OnlinePlannerSettings{}.period,
           nb::arg("patience") = OnlinePlannerSettings{}.patience, nb::arg("retry") = OnlinePlannerSettings{}.retry,
           nb::arg("tolerance") = OnlinePlannerConfig{}.tolerance, nb::arg("duration") = OnlinePlannerConfig{}.duration,
@@ -220,13 +220,13 @@ void bind_guidance(nb::module_& m) {
       "pairs, as for ClearanceTableBarrier; settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<PairDistanceTable> tables,
              const std::optional<PlannerSettings>& settings) {
             check_fitted_to(robot, body);
             new (self) PathPlanner(robot, body, pairs, std::move(tables), settings.value_or(PlannerSettings{}));
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
-          nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("settings") = nb::none())
+          nb::arg("tables") = std::vector<PairDistanceTable>{}, nb::arg("settings") = nb::none())
       .def(
           "plan",
           [](PathPlanner& p, const ArrayLike& start, const ArrayLike& goal, const Obstacles& obstacles,

@@ -42,7 +42,7 @@ void check(const ArmParts& arm) {
       }
     }
   }
-  for (const ClearanceTable& table : arm.tables) {
+  for (const PairDistanceTable& table : arm.tables) {
     check_pair_of_links(arm.robot, table.first, table.second, "clearance table");
     table.validate(arm.robot.num_coordinates());
   }
@@ -66,7 +66,7 @@ void check(const ArmParts& arm) {
 
 }  // namespace
 
-Arm::Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<ClearanceTable> tables,
+Arm::Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<PairDistanceTable> tables,
          std::vector<Inertial> inertials, ArmDetails details) {
   auto content = std::make_shared<Content>(Content{std::move(robot), std::move(body), std::move(pairs), std::move(tables),
                                                    std::move(inertials), std::move(details), ""});

@@ -13,7 +13,7 @@ struct ArmParts {
   const Robot& robot;
   const Body& body;
   const std::vector<LinkPair>& pairs;
-  const std::vector<ClearanceTable>& tables;
+  const std::vector<PairDistanceTable>& tables;
   const std::vector<Inertial>& inertials;
   const ArmDetails& details;
 };

@@ -167,12 +167,12 @@ std::vector<LinkPair> read_pairs(ArmReader& in) {
   return pairs;
 }
 
-void write_tables(ArmWriter& out, const std::vector<ClearanceTable>& tables) {
+void write_tables(ArmWriter& out, const std::vector<PairDistanceTable>& tables) {
   out.count(tables.size());
-  for (const ClearanceTable& table : tables) {
+  for (const PairDistanceTable& table : tables) {
     out.text(table.first);
     out.text(table.second);
-    for (const ClearanceTable::Axis& axis : table.axes) {
+    for (const PairDistanceTable::Axis& axis : table.axes) {
       out.integer(static_cast<std::int32_t>(axis.coordinate));
       out.number(axis.begin);
       out.number(axis.spacing);
@@ -184,12 +184,12 @@ void write_tables(ArmWriter& out, const std::vector<ClearanceTable>& tables) {
   }
 }
 
-std::vector<ClearanceTable> read_tables(ArmReader& in) {
-  std::vector<ClearanceTable> tables(in.count(smallest_table));
-  for (ClearanceTable& table : tables) {
+std::vector<PairDistanceTable> read_tables(ArmReader& in) {
+  std::vector<PairDistanceTable> tables(in.count(smallest_table));
+  for (PairDistanceTable& table : tables) {
     table.first = in.text();
     table.second = in.text();
-    for (ClearanceTable::Axis& axis : table.axes) {
+    for (PairDistanceTable::Axis& axis : table.axes) {
       axis.coordinate = in.integer<std::int32_t>();
       axis.begin = in.number();
       axis.spacing = in.number();
@@ -247,7 +247,7 @@ Arm read_sections(ArmReader& in, std::uint32_t of_version) {
   ArmDetails details;
   details.proof = in.section("PROF", read_proof);
   std::vector<LinkPair> pairs = in.section("PAIR", read_pairs);
-  std::vector<ClearanceTable> tables = in.section("TABL", read_tables);
+  std::vector<PairDistanceTable> tables = in.section("TABL", read_tables);
   details.allowed_pairs = in.section("ALLW", read_allowed);
   details.provenance = in.section("PROV", [](ArmReader& section) {
     Provenance from;

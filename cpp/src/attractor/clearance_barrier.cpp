@@ -55,8 +55,8 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
                                                         temperature, pairs_owner),
                        function, reach, pairs_owner) {}
 
-ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables,
-                                             const BarrierFunction& function, double reach)
+PairDistanceTableBarrier::PairDistanceTableBarrier(const Robot& robot, std::vector<PairDistanceTable> tables,
+                                                   const BarrierFunction& function, double reach)
     : ClearanceBarrier(robot, std::make_shared<TableClearances>(robot, std::move(tables), tables_owner), function, reach,
                        tables_owner) {}
 

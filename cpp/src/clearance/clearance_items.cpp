@@ -40,7 +40,7 @@ ClearanceItem::ClearanceItem(Source from, int number, CoordinateLabel what, Eige
       bend(Eigen::MatrixXd::Zero(nv, nv)) {}
 
 ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
-                               const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables,
+                               const std::vector<KeptPlane>& planes, std::vector<PairDistanceTable> tables,
                                std::optional<GravityTorqueLimit> gravity_torque, double temperature)
     : robot_(std::move(robot)),
       links_(std::make_shared<BodyLinks>(robot_, body, items_owner)),
@@ -142,7 +142,7 @@ void ClearanceItems::add_reach(ClearanceItem& item, const LinkEllipsoids& link) 
 
 void ClearanceItems::add_tables() {
   for (int k = 0; tables_ && k < tables_->size(); ++k) {
-    const ClearanceTable& table = (*tables_)[k];
+    const PairDistanceTable& table = (*tables_)[k];
     ClearanceItem& item = items_.emplace_back(Source::table, k, tables_->label(k), robot_.num_coordinates());
     const Eigen::Vector2d steepest = table.steepest();
     item.reach[table.axes[0].coordinate] = steepest[0];

@@ -38,7 +38,7 @@ ClearanceQuery::Found ClearanceQuery::measure(const ClearanceItem& item, const O
       return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
     }
     case ClearanceItem::Source::table: {
-      const ClearanceTable& table = (*items_->tables())[item.index];
+      const PairDistanceTable& table = (*items_->tables())[item.index];
       const double clearance = table.at(w.placed_[table.axes[0].coordinate], w.placed_[table.axes[1].coordinate]).value;
       return {std::min(clearance, asked.cap), -1};
     }

@@ -20,12 +20,12 @@ struct Tangent {
 
 }  // namespace
 
-TableClearances::TableClearances(const Robot& robot, std::vector<ClearanceTable> tables, const char* owner)
+TableClearances::TableClearances(const Robot& robot, std::vector<PairDistanceTable> tables, const char* owner)
     : tables_(std::move(tables)) {
   if (tables_.empty()) {
     throw std::invalid_argument(std::string(owner) + ": there is no table");
   }
-  for (const ClearanceTable& table : tables_) {
+  for (const PairDistanceTable& table : tables_) {
     robot.frame_index(table.first), robot.frame_index(table.second);
     table.validate(robot.num_coordinates());
     steepest_.push_back(table.steepest());
@@ -36,12 +36,12 @@ TableClearances::TableClearances(const Robot& robot, std::vector<ClearanceTable>
 void TableClearances::evaluate(const KinematicState& state, const Obstacles& /*obstacles*/, double reach, const Horizon& ahead,
                                ClearanceView out) const noexcept {
   for (std::size_t i = 0; i < tables_.size(); ++i) {
-    const ClearanceTable& table = tables_[i];
+    const PairDistanceTable& table = tables_[i];
     const int x = table.axes[0].coordinate, y = table.axes[1].coordinate;
     const Eigen::Vector2d v(state.v()[x], state.v()[y]);
     // The tangent at `time` along the straight path, seen from where the arm is.
     const auto tangent = [&](double time) {
-      const ClearanceTable::Sample h = table.at(state.q()[x] + time * v.x(), state.q()[y] + time * v.y());
+      const PairDistanceTable::Sample h = table.at(state.q()[x] + time * v.x(), state.q()[y] + time * v.y());
       const double rate = h.gradient.dot(v);
       return Tangent{h.value - time * rate, rate, v.dot(h.hessian * v), h.gradient};
     };
@@ -78,7 +78,7 @@ void TableClearances::evaluate(const KinematicState& state, const Obstacles& /*o
 }
 
 CoordinateLabel TableClearances::label(int k) const {
-  const ClearanceTable& table = tables_[static_cast<std::size_t>(k)];
+  const PairDistanceTable& table = tables_[static_cast<std::size_t>(k)];
   return {CoordinateLabel::Kind::self, table.first, table.second};
 }
 

@@ -25,8 +25,8 @@ namespace {
 constexpr std::size_t header_size = 52, version_place = 8, size_place = 12, hash_place = 20;
 using Bytes = std::vector<std::byte>;
 
-ClearanceTable small_table() {
-  ClearanceTable table;
+PairDistanceTable small_table() {
+  PairDistanceTable table;
   table.first = "link0";
   table.second = "link2";
   table.axes[0] = {1, -1.0, 0.5, false};
@@ -41,7 +41,7 @@ struct Parts {
   Robot robot;
   Body body;
   std::vector<LinkPair> pairs;
-  std::vector<ClearanceTable> tables;
+  std::vector<PairDistanceTable> tables;
   std::vector<Inertial> inertials;
   ArmDetails details;
 

@@ -229,7 +229,8 @@ BOOST_AUTO_TEST_CASE(an_edge_through_a_table_has_no_gap) {
     if (nv < 2) {
       continue;
     }
-    ClearanceTable table{"link0", "link3", {ClearanceTable::Axis{0, -3.0, 0.5, false}, {nv - 1, -M_PI, M_PI / 4.0, true}}, {}};
+    PairDistanceTable table{
+        "link0", "link3", {PairDistanceTable::Axis{0, -3.0, 0.5, false}, {nv - 1, -M_PI, M_PI / 4.0, true}}, {}};
     table.control = 0.03 * random.matrix(13, 8);
     const ClearanceQuery checked(robot, body, {}, {}, {table});
     ClearanceQuery::Workspace w(checked);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/clearance/clearance_table.hpp"
+#include "sidestep/clearance/pair_distance_table.hpp"
 #include "sidestep/body/link_pair.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/robot/dynamics.hpp"
@@ -54,8 +54,8 @@ class Arm {
   /// `inertials`: one per joint in the frame of the joint's child, or empty for an arm without dynamics.
   /// Throws std::invalid_argument that names what is wrong: a body that is not calibrated, an unknown link, a table or
   /// an inertia that does not suit the robot.
-  Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<ClearanceTable> tables, std::vector<Inertial> inertials,
-      ArmDetails details = {});
+  Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<PairDistanceTable> tables,
+      std::vector<Inertial> inertials, ArmDetails details = {});
 
   /// Reads an `.arm` file. Throws std::system_error if the file cannot be read, and std::invalid_argument that names
   /// the file, what is wrong with it and what to do: not an arm file, cut off, damaged, of a newer version,
@@ -75,7 +75,7 @@ class Arm {
   const Robot& robot() const noexcept { return content_->robot; }
   const Body& body() const noexcept { return content_->body; }
   const std::vector<LinkPair>& pairs() const noexcept { return content_->pairs; }
-  const std::vector<ClearanceTable>& tables() const noexcept { return content_->tables; }
+  const std::vector<PairDistanceTable>& tables() const noexcept { return content_->tables; }
   const std::vector<Inertial>& inertials() const noexcept { return content_->inertials; }
   bool has_dynamics() const noexcept { return !content_->inertials.empty(); }
   const std::vector<CoverProof>& proof() const noexcept { return content_->details.proof; }
@@ -98,7 +98,7 @@ class Arm {
     Robot robot;
     Body body;
     std::vector<LinkPair> pairs;
-    std::vector<ClearanceTable> tables;
+    std::vector<PairDistanceTable> tables;
     std::vector<Inertial> inertials;
     ArmDetails details;
     std::string hash;

@@ -57,10 +57,10 @@ class SelfCollisionBarrier final : public ClearanceBarrier {
 };
 
 /// Of pairs of links whose clearances tables hold, see TableClearances.
-class ClearanceTableBarrier final : public ClearanceBarrier {
+class PairDistanceTableBarrier final : public ClearanceBarrier {
  public:
-  ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, const BarrierFunction& function,
-                        double reach = 0.0);
+  PairDistanceTableBarrier(const Robot& robot, std::vector<PairDistanceTable> tables, const BarrierFunction& function,
+                           double reach = 0.0);
 };
 
 /// Of links to a plane that must not be crossed, see PlaneClearances.

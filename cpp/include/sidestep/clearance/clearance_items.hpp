@@ -54,7 +54,7 @@ class ClearanceItems {
   /// `temperature` [m] of the means that have derivatives. Throws std::invalid_argument if the body is not calibrated or no
   /// joint moves it, a pair, plane or table is at fault, a name is unknown, or a prismatic joint has no limits.
   ClearanceItems(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
-                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
+                 const std::vector<KeptPlane>& planes = {}, std::vector<PairDistanceTable> tables = {},
                  std::optional<GravityTorqueLimit> gravity_torque = std::nullopt,
                  double temperature = PairClearances::default_temperature);
 

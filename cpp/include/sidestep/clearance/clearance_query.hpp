@@ -40,7 +40,7 @@ class ClearanceQuery {
   explicit ClearanceQuery(std::shared_ptr<const ClearanceItems> items);
   /// Of items of its own, see ClearanceItems.
   ClearanceQuery(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
-                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
+                 const std::vector<KeptPlane>& planes = {}, std::vector<PairDistanceTable> tables = {},
                  std::optional<GravityTorqueLimit> gravity_torque = std::nullopt)
       : ClearanceQuery(std::make_shared<const ClearanceItems>(std::move(robot), body, pairs, planes, std::move(tables),
                                                               std::move(gravity_torque))) {}

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sidestep/clearance/clearance_group.hpp"
-#include "sidestep/clearance/clearance_table.hpp"
+#include "sidestep/clearance/pair_distance_table.hpp"
 #include "sidestep/robot/robot.hpp"
 
 namespace sidestep {
@@ -20,7 +20,7 @@ class TableClearances final : public ClearanceGroup {
  public:
   /// Throws std::invalid_argument, which `owner` begins, if there is no table; or if a link is unknown or a table at fault,
   /// which it names.
-  TableClearances(const Robot& robot, std::vector<ClearanceTable> tables, const char* owner);
+  TableClearances(const Robot& robot, std::vector<PairDistanceTable> tables, const char* owner);
 
   int size() const noexcept override { return static_cast<int>(tables_.size()); }
   CoordinateLabel label(int k) const override;
@@ -28,10 +28,10 @@ class TableClearances final : public ClearanceGroup {
                 ClearanceView out) const noexcept override;
   double longest_activation(int k) const noexcept override { return activations_[static_cast<std::size_t>(k)]; }
 
-  const ClearanceTable& operator[](int k) const noexcept { return tables_[static_cast<std::size_t>(k)]; }
+  const PairDistanceTable& operator[](int k) const noexcept { return tables_[static_cast<std::size_t>(k)]; }
 
  private:
-  std::vector<ClearanceTable> tables_;
+  std::vector<PairDistanceTable> tables_;
   std::vector<Eigen::Vector2d> steepest_;  // of each
   std::vector<double> activations_;
 };

@@ -1,4 +1,4 @@
-#include "sidestep/clearance/clearance_table.hpp"
+#include "sidestep/clearance/pair_distance_table.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ struct Weights {
   std::array<Eigen::Index, 4> index;
   Eigen::Vector4d value, first, second;
 
-  Weights(const ClearanceTable::Axis& axis, Eigen::Index count, double q) noexcept {
+  Weights(const PairDistanceTable::Axis& axis, Eigen::Index count, double q) noexcept {
     const double x = (q - axis.begin) / axis.spacing;
     const auto last = static_cast<double>(count - 3);
     // Of a state that is not finite the weights are not, and the indices valid.
@@ -34,7 +34,7 @@ struct Weights {
 
 }  // namespace
 
-ClearanceTable::Sample ClearanceTable::at(double x, double y) const noexcept {
+PairDistanceTable::Sample PairDistanceTable::at(double x, double y) const noexcept {
   const Weights a(axes[0], control.rows(), x), b(axes[1], control.cols(), y);
   Eigen::Matrix4d c;
   for (int j = 0; j < 4; ++j) {
@@ -49,7 +49,7 @@ ClearanceTable::Sample ClearanceTable::at(double x, double y) const noexcept {
           Eigen::Matrix2d{{a.second.dot(along), mixed}, {mixed, a.value.dot(c * b.second)}}};
 }
 
-Eigen::Vector2d ClearanceTable::steepest() const noexcept {
+Eigen::Vector2d PairDistanceTable::steepest() const noexcept {
   const auto slope = [&](const Eigen::MatrixXd& along, const Axis& axis) {
     const Eigen::Index last = along.rows() - 1;
     double most = (along.bottomRows(last) - along.topRows(last)).cwiseAbs().maxCoeff();
@@ -61,14 +61,14 @@ Eigen::Vector2d ClearanceTable::steepest() const noexcept {
   return {slope(control, axes[0]), slope(control.transpose(), axes[1])};
 }
 
-double ClearanceTable::median() const {
+double PairDistanceTable::median() const {
   std::vector<double> values(control.data(), control.data() + control.size());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-void ClearanceTable::validate(int coordinates) const {
+void PairDistanceTable::validate(int coordinates) const {
   const std::string name = "clearance table of links '" + first + "' and '" + second + "': ";
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const Axis& axis = axes[k];

@@ -10,7 +10,7 @@ namespace sidestep {
 ///
 /// A uniform cubic B-spline in either coordinate, h(x, y) = Σ_ij B_i(x) B_j(y) c_ij, so twice continuously
 /// differentiable. Beyond its ends it and its derivatives stay as they are there.
-struct ClearanceTable {
+struct PairDistanceTable {
   /// Where the control points are: the one of number i at begin + i·spacing.
   struct Axis {
     int coordinate = 0;     ///< of the robot
