@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../math/kernels/lanes.inl"
+#include "../../math/kernels/simd.inl"
 
 /// A block of the matrix stays in registers while the columns are gone through: `width` rows of `block` columns.
 void add_gram(const double* columns, int num, int rows, double* matrix, int stride) noexcept {

@@ -4,11 +4,11 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../math/kernels/lanes.inl"
+#include "../../math/kernels/simd.inl"
 
 #include "clearance_sums.inl"
 
-#include "clearance_looks.inl"
+#include "point_tree_bounds.inl"
 
 // Of roots, and so of distances and speeds relative to the larger ones that they come from.
 constexpr float measure_error = 3.0f * rough_error;

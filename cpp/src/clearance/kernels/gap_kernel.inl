@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../math/kernels/lanes.inl"
+#include "../../math/kernels/simd.inl"
 
 constexpr int most_steps = 16;
 constexpr int most_halvings = 8;

@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "lanes.inl"
+#include "simd.inl"
 
 // As many as two units with a latency of four or five cycles take, and registers hold.
 constexpr int chains = 12;

@@ -1,4 +1,4 @@
-// A vector of three in each lane, and what is done with it. To be included after lanes.inl, inside an anonymous
+// A vector of three in each lane, and what is done with it. To be included after simd.inl, inside an anonymous
 // namespace.
 
 struct Vectors {

@@ -6,7 +6,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "../../math/kernels/lanes.inl"
+#include "../../math/kernels/simd.inl"
 #include "../../math/kernels/vectors.inl"
 
 constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // 1/(2π)³
