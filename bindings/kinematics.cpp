@@ -109,7 +109,7 @@ void bind_kinematics(nb::module_& m) {
           [](const Robot& r) {
             std::vector<std::string> units;
             for (int c = 0; c < r.num_coordinates(); ++c) {
-              units.emplace_back(r.slides(c) ? "m" : "rad");
+              units.emplace_back(r.is_prismatic(c) ? "m" : "rad");
             }
             return units;
           },

@@ -18,9 +18,9 @@ std::string distance(double clearance) {
   return clearance < 0.0 ? number("%.0f mm deep", -1000.0 * clearance) : number("%.0f mm away", 1000.0 * clearance);
 }
 
-/// A way of a joint: in mm if it slides, else in rad by this format.
-std::string way(double value, const char* radians, bool slides) {
-  return slides ? number("%.1f mm", 1000.0 * value) : number(radians, value);
+/// A way of a joint: in mm if it is prismatic, else in rad by this format.
+std::string way(double value, const char* radians, bool prismatic) {
+  return prismatic ? number("%.1f mm", 1000.0 * value) : number(radians, value);
 }
 
 /// For example "link fr3_link5" and "obstacle point 2, 31 mm away".
@@ -37,7 +37,7 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacle
     case CoordinateLabel::Kind::joint_limit:
       return {"joint " + label.name,
               "its " + label.other + " limit" +
-                  (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.slides) +
+                  (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.prismatic) +
                                                     (d.clearance < 0.0 ? " beyond it" : " away")
                                               : "")};
     case CoordinateLabel::Kind::effort: return {"joint " + label.name, "its effort limit, by what it holds of the arm"};
@@ -63,7 +63,7 @@ const char* name(MotionState state) noexcept {
 
 std::string Diagnosis::way_left() const {
   if (!std::isnan(joint_error)) {
-    return way(joint_error, "%.2f rad", slides);
+    return way(joint_error, "%.2f rad", prismatic);
   }
   const std::string position = number("%.1f mm", 1000.0 * position_error);
   return std::isnan(rotation_error) ? position : position + number(" and %.2f rad", rotation_error);
@@ -102,7 +102,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   }
   d.joint_error = w.pull.joint_error;
   const int farthest = w.pull.farthest_coordinate();
-  d.slides = farthest >= 0 && robot_.slides(farthest);
+  d.prismatic = farthest >= 0 && robot_.is_prismatic(farthest);
   d.position_error = w.pull.position_error;
   d.rotation_error = w.pull.rotation_error;
 
@@ -169,7 +169,7 @@ Diagnosis GeometricSystem::diagnose(ConstVectorRef q, ConstVectorRef v, const Go
   there.blocked = here.blocked;
   there.speed = here.speed;
   there.joint_error = here.joint_error;
-  there.slides = here.slides;
+  there.prismatic = here.prismatic;
   return there;
 }
 

@@ -84,7 +84,7 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
          << " by way of nearest_rotation(R); a quaternion must have norm 1";
     throw std::invalid_argument(text.str());
   }
-  // Lengths from the tip inwards; a sliding joint adds its travel, a shoulder's own placement does not count.
+  // Lengths from the tip inwards; a prismatic joint adds its travel, a shoulder's own placement does not count.
   made_for_.reach = made_for_.frame.X_JF.translation().norm();
   for (int j = made_for_.frame.joint; j >= 0;) {
     const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];

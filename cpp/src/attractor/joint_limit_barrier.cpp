@@ -21,7 +21,7 @@ JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier
   set_num_coordinates(static_cast<int>(limits_.size()));
   for (std::size_t k = 0; k < limits_.size(); ++k) {
     const int j = limits_[k].joint_coordinate;
-    if (robot.slides(j)) {
+    if (robot.is_prismatic(j)) {
       shorten_activation(static_cast<int>(k), range_share * (robot.limits().upper[j] - robot.limits().lower[j]));
     }
   }
@@ -48,7 +48,7 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state, c
 CoordinateLabel JointLimitBarrier::label(int k) const {
   const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
   return {CoordinateLabel::Kind::joint_limit, robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
-          limit.sign > 0.0 ? "lower" : "upper", floor(k), robot().slides(limit.joint_coordinate)};
+          limit.sign > 0.0 ? "lower" : "upper", floor(k), robot().is_prismatic(limit.joint_coordinate)};
 }
 
 }  // namespace sidestep

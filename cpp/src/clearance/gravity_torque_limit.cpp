@@ -51,21 +51,21 @@ GravityTorqueLimit::GravityTorqueLimit(const RigidBodyDynamics& dynamics, const 
   const double g = gravity_.norm();
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(nv), weight = largest;
   // Derivatives of the potential energy are bounded by the moment, or the weight, of what the last of their joints carries, if those
-  // are on one chain; what slides turns nothing.
+  // are on one chain; a prismatic joint turns nothing.
   const auto bound = [&](std::initializer_list<int> of) {
     const int last = std::max(of);
     double product =
         g *
         (joints[static_cast<std::size_t>(last)].type == JointType::revolute ? moment : mass)[static_cast<std::size_t>(last)];
-    bool slid = false;
+    bool has_prismatic = false;
     for (const int i : of) {
       const Joint& joint = joints[static_cast<std::size_t>(i)];
       const std::vector<int>& below = carried[static_cast<std::size_t>(i)];
-      const bool slides = joint.type == JointType::prismatic;
-      if (std::find(below.begin(), below.end(), last) == below.end() || (slides && (i != last || slid))) {
+      const bool prismatic = joint.type == JointType::prismatic;
+      if (std::find(below.begin(), below.end(), last) == below.end() || (prismatic && (i != last || has_prismatic))) {
         return 0.0;
       }
-      slid = slid || slides;
+      has_prismatic = has_prismatic || prismatic;
       product *= std::abs(joint.multiplier);
     }
     return product;

@@ -119,7 +119,7 @@ Diagnosis diagnosis(const AttractorStage& attractor, const InputsStage& inputs, 
   if (!inputs.request().is_any() || inputs.request().has_input() || d.state == MotionState::fallback) {
     return d;
   }
-  d.slides = false;
+  d.prismatic = false;
   d.joint_error = d.position_error = d.rotation_error = std::numeric_limits<double>::quiet_NaN();
   if (const PoseGoal* pose = inputs.request().pose_goal()) {
     const PoseError error = pose_error(*pose, at_arm);
@@ -131,7 +131,7 @@ Diagnosis diagnosis(const AttractorStage& attractor, const InputsStage& inputs, 
   } else {
     Eigen::Index farthest = 0;
     d.joint_error = (arm.position() - std::get<JointGoal>(inputs.destination()).position).cwiseAbs().maxCoeff(&farthest);
-    d.slides = joints.slides(farthest);
+    d.prismatic = joints.slides(farthest);
   }
   if (d.state == MotionState::free || d.state == MotionState::arriving) {
     d.state = d.is_near() ? MotionState::arriving : MotionState::free;

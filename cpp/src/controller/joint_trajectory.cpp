@@ -54,7 +54,7 @@ void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::Ve
       if (!(q(j, k) >= lower - JointLimits::rounding && q(j, k) <= upper + JointLimits::rounding && std::isfinite(q(j, k)))) {
         refuse_trajectory("joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] + "' of sample " +
                           std::to_string(k) + " is " + std::to_string(q(j, k)) + ", allowed: " + std::to_string(lower) +
-                          " to " + std::to_string(upper) + (robot.slides(j) ? " m" : " rad") +
+                          " to " + std::to_string(upper) + (robot.is_prismatic(j) ? " m" : " rad") +
                           Plausibility::hint(robot, q.col(k)));
       }
     }
@@ -166,7 +166,7 @@ JointTrajectory::JointTrajectory(const Robot& robot, const Eigen::MatrixXd& q, c
   spread_bunched_stamps(q_, velocity, acceleration, begin, times_);
   corner_ = Eigen::VectorXd::Constant(q.rows(), corner);
   for (int j = 0; j < robot.num_coordinates(); ++j) {
-    corner_[j] *= robot.slides(j) ? sliding_corner : 1.0;
+    corner_[j] *= robot.is_prismatic(j) ? sliding_corner : 1.0;
   }
   lead_end_ = Eigen::VectorXd::Zero(q.rows());
   set_slopes(begin);

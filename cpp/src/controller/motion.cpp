@@ -59,7 +59,7 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
   const std::vector<bool> unlimited = unlimited_joints(robot);
   std::vector<bool> slides(unlimited.size());
   for (std::size_t j = 0; j < slides.size(); ++j) {
-    slides[j] = robot.slides(static_cast<int>(j));
+    slides[j] = robot.is_prismatic(static_cast<int>(j));
   }
   const auto away = [&](const Eigen::VectorXd& at) {  // of the goal; a turn more or less is the same place
     double largest = 0.0;

@@ -66,7 +66,7 @@ Plausibility::Plausibility(const Robot& robot, Eigen::VectorXd reach)
     : names_(robot.coordinate_names()), limits_(robot.limits()) {
   const auto nv = static_cast<std::size_t>(robot.num_coordinates());
   for (std::size_t j = 0; j < nv; ++j) {
-    slides_.push_back(robot.slides(static_cast<int>(j)));
+    slides_.push_back(robot.is_prismatic(static_cast<int>(j)));
   }
   // Lengths between joints, added, from each joint on the base to the farthest joint or frame.
   std::vector<double> lengths;
@@ -236,7 +236,7 @@ std::string Plausibility::hint(const Robot& robot, ConstVectorRef q) {
     if (q[j] >= limits.lower[j] - beyond && q[j] <= limits.upper[j] + beyond) {
       continue;
     }
-    const bool slides = robot.slides(static_cast<int>(j));
+    const bool slides = robot.is_prismatic(static_cast<int>(j));
     const double meant = q[j] * (slides ? 1e-3 : degree);
     if (!(meant >= limits.lower[j] - JointLimits::rounding && meant <= limits.upper[j] + JointLimits::rounding)) {
       return {};

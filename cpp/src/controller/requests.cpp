@@ -93,7 +93,7 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
         if (position[j] < lower - JointLimits::rounding || position[j] > upper + JointLimits::rounding) {
           throw std::invalid_argument("controller: goal: joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] +
                                       "' is " + std::to_string(position[j]) + ", allowed: " + std::to_string(lower) + " to " +
-                                      std::to_string(upper) + (robot.slides(static_cast<int>(j)) ? " m" : " rad") +
+                                      std::to_string(upper) + (robot.is_prismatic(static_cast<int>(j)) ? " m" : " rad") +
                                       Plausibility::hint(robot, position));
         }
       }

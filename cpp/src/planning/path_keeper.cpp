@@ -233,7 +233,7 @@ void PathKeeper::answer(const State& state, PlanStatus status) {
   answer.path_number = path_number_;
   if (status == PlanStatus::found) {
     answer.route = path_.motion();
-    // A joint that slides at 1 cm/s, or a narrow place, is no reason to look for another way.
+    // A prismatic joint at 1 cm/s, or a narrow place, is no reason to look for another way.
     answer.progress = std::min(usual_progress, progress_share * path_.motion()->motion.slowest(settings_.planner.patience));
     exchange_.show(path_.motion(), path_.motion_number());
   }

@@ -150,8 +150,8 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
   joints_hash_ = hash_of(joints_, coordinate_names_);
 }
 
-bool Robot::slides(int coordinate) const noexcept {
-  bool found = false, slides = false;
+bool Robot::is_prismatic(int coordinate) const noexcept {
+  bool found = false, prismatic = false;
   for (const Joint& joint : joints_) {
     if (joint.coordinate != coordinate) {
       continue;
@@ -159,10 +159,10 @@ bool Robot::slides(int coordinate) const noexcept {
     if (joint.name == coordinate_names_[static_cast<std::size_t>(coordinate)]) {
       return joint.type == JointType::prismatic;  // the others mimic it
     }
-    slides = found ? slides : joint.type == JointType::prismatic;
+    prismatic = found ? prismatic : joint.type == JointType::prismatic;
     found = true;
   }
-  return slides;
+  return prismatic;
 }
 
 bool Robot::same_joints(const Robot& other) const noexcept {

@@ -56,7 +56,7 @@ struct Diagnosis {
   double speed = 0.0;    ///< |v| [rad/s]
   // How far the goal is, as in GoalPull; NaN where it has no such part.
   double joint_error = nan, position_error = nan, rotation_error = nan;
-  bool slides = false;  ///< the joint of `joint_error` slides, so that it is in m
+  bool prismatic = false;  ///< the joint of `joint_error` is prismatic, so that it is in m
 
   /// How far the goal is, for example "0.31 rad", "12.0 mm" or "12.0 mm and 0.31 rad".
   std::string way_left() const;

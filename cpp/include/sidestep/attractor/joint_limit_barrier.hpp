@@ -10,7 +10,7 @@ namespace sidestep {
 ///
 ///     ψ = strength (activation / h − 1)^power,   h = q_j − q_j⁻ or q_j⁺ − q_j  [rad | m],
 ///
-/// of the same kind as the clearance barriers. The activation distance of a sliding joint is no longer than
+/// of the same kind as the clearance barriers. The activation distance of a prismatic joint is no longer than
 /// `range_share` of its range: a finger with 40 mm of travel is free to use nearly all of it. The acceleration bounds
 /// of the controller hold the limits; this one makes the motion bend before it comes to that.
 class JointLimitBarrier final : public Barrier {

@@ -19,7 +19,7 @@ struct CoordinateLabel {
   std::string name = {};                                    ///< of the link, or of the coordinate for limits
   std::string other = {};                                   ///< the second link of a pair; "lower" or "upper" for a joint limit
   double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
-  bool slides = false;                                      ///< a limit of a sliding joint: the clearance is in m, not in rad
+  bool prismatic = false;                                   ///< a limit of a prismatic joint: the clearance is in m, not in rad
 };
 
 }  // namespace sidestep

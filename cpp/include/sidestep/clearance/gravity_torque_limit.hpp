@@ -11,7 +11,7 @@ namespace sidestep {
 ///
 ///     h_j(q) = (effort_j − |g_j(q)|) / weight_j  [m],
 ///
-/// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a sliding joint it is a share of
+/// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a prismatic joint it is a share of
 /// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below. It is no clearance from
 /// anything, so that Clearances::least says nothing of it.
 class GravityTorqueLimit final : public ClearanceGroup {
@@ -30,7 +30,7 @@ class GravityTorqueLimit final : public ClearanceGroup {
     double effort;             ///< [Nm | N]
     double weight;             ///< [N]
     double activation;         ///< [m], no longer than a tenth of effort / weight
-    Eigen::VectorXd steepest;  ///< bounds |∂h/∂q| (nv) [m/rad]; infinite below a sliding joint without limits
+    Eigen::VectorXd steepest;  ///< bounds |∂h/∂q| (nv) [m/rad]; infinite below a prismatic joint without limits
     Eigen::MatrixXd bend;      ///< bounds |∂²h/∂q²| (nv × nv) [m/rad²]
     std::vector<Carrier> carriers;
   };

@@ -71,8 +71,8 @@ class Robot {
   const std::vector<std::string>& coordinate_names() const noexcept { return coordinate_names_; }
   const JointLimits& limits() const noexcept { return limits_; }
 
-  /// Whether a coordinate is a length [m], that of a sliding joint, and not an angle [rad].
-  bool slides(int coordinate) const noexcept;
+  /// Whether a coordinate is a length [m], that of a prismatic joint, and not an angle [rad].
+  bool is_prismatic(int coordinate) const noexcept;
 
   /// Whether the other robot has the same joints in the same places, so that their states mean the same.
   bool same_joints(const Robot& other) const noexcept;
