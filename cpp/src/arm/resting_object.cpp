@@ -13,7 +13,7 @@ namespace sidestep {
 namespace {
 
 constexpr int most_cuts = 40;         // of one ellipsoid
-constexpr double tolerance = 5e-4;    // [m] of the room
+constexpr double tolerance = 5e-4;    // [m] of the distance kept
 constexpr int halvings = 60;          // of the interval of t
 constexpr int num_directions = 2000;  // in which supports are compared
 
@@ -41,7 +41,7 @@ struct Cut {
 };
 
 Cut worst(const Eigen::Vector3d& centre, const Eigen::Matrix3d& A, const Obstacles& obstacles,
-          const std::vector<Eigen::Index>& points, double room) {
+          const std::vector<Eigen::Index>& points, double distance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(A * A.transpose());
   const Eigen::Vector3d squares = solver.eigenvalues().cwiseMax(0.0);
   const double extent = std::sqrt(squares[2]);
@@ -49,13 +49,13 @@ Cut worst(const Eigen::Vector3d& centre, const Eigen::Matrix3d& A, const Obstacl
   for (const Eigen::Index k : points) {
     const Eigen::Vector3d e = obstacles.points().col(k) - centre;
     const double r = obstacles.radii()[k];
-    if (e.norm() - extent - r > room) {
+    if (e.norm() - extent - r > distance) {
       continue;
     }
     const Eigen::Vector3d n = normal_at(e, solver.eigenvectors(), squares);
     const double gap = n.dot(e) - (A.transpose() * n).norm() - r;
     if (!(gap >= cut.gap)) {  // also where the point is the centre itself
-      cut = {gap, n, n.dot(obstacles.points().col(k)) - r - room, k};
+      cut = {gap, n, n.dot(obstacles.points().col(k)) - r - distance, k};
     }
   }
   return cut;
@@ -118,7 +118,7 @@ std::vector<Eigen::Index> points_of(const Attachment& object, const Obstacles& o
 }  // namespace
 
 RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
-                      double room) {
+                      double distance) {
   const std::vector<Eigen::Index> points = points_of(object, obstacles);
   KinematicState state(robot);
   state.update(robot, q, Eigen::VectorXd::Zero(q.size()));
@@ -132,11 +132,11 @@ RestingObject resting(const Robot& robot, const Attachment& object, const Eigen:
     Eigen::Matrix3d A = whole_A;
     bool is_cut = false;
     for (int k = 0;; ++k) {
-      const Cut cut = worst(c, A, obstacles, points, room);
-      if (cut.gap >= room - tolerance) {
+      const Cut cut = worst(c, A, obstacles, points, distance);
+      if (cut.gap >= distance - tolerance) {
         break;
       }
-      const double deep = (whole_A.transpose() * cut.normal).norm() - (cut.offset - cut.normal.dot(whole_c)) - room;
+      const double deep = (whole_A.transpose() * cut.normal).norm() - (cut.offset - cut.normal.dot(whole_c)) - distance;
       if (!(deep <= deepest_rest)) {
         const bool is_known = std::isfinite(deep);
         cannot_rest(object, "its cover is " + (is_known ? millimetres(deep) : std::string("too")) + " deep in " +
@@ -146,7 +146,7 @@ RestingObject resting(const Robot& robot, const Attachment& object, const Eigen:
       const Eigen::Vector3d along = A.transpose() * cut.normal;
       const double beta = (cut.offset - cut.normal.dot(c)) / along.norm();
       if (!(beta > -1.0) || k >= most_cuts) {
-        cannot_rest(object, "an ellipsoid of its cover lies wholly within " + millimetres(room) +
+        cannot_rest(object, "an ellipsoid of its cover lies wholly within " + millimetres(distance) +
                                 ", safety.margin and 1 mm, of " + obstacles.words_for(cut.point) +
                                 "; lower safety.margin, or give fewer components");
       }

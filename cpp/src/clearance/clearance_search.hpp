@@ -33,7 +33,7 @@ class ClearanceField::Search {
     link_ = &link;
     is_placed_ = false;
     surround();
-    // Leaves beyond the reach may weigh beside what is found within it: they are put off, as far as there is room.
+    // Leaves beyond the reach may weigh beside what is found within it: they are put off, as far as there is space.
     kernels::Limits within = limits(reach_, horizon_.distance);
     const kernels::Limits beyond = limits(reach_ + group_.window, horizon_.distance + group_.window_ahead);
     int num_put_off = 0;
@@ -61,7 +61,7 @@ class ClearanceField::Search {
       take(put_off_[static_cast<std::size_t>(next++)], beyond);
     }
     collect();
-    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of room, may hold
+    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of space, may hold
     // what lies too far above what was found later.
     bool is_missing = goes_beyond && is_full;
     for (int pass = 0; pass < most_passes; ++pass, is_missing = false) {

@@ -47,8 +47,8 @@ void AvoidanceTrajectory::advance(double period) noexcept {
 double AvoidanceTrajectory::reference_acceleration(Eigen::Index j, double period) const noexcept {
   const double left = target_[j] - position_[j], side = left < 0.0 ? -1.0 : 1.0;
   const double v = side * velocity_[j], A = hardest_[j];
-  const double room = std::abs(left) - 0.5 * period * v, step = A * period;
-  const double stops = room > 0.0 ? std::sqrt(step * step + 2.0 * A * room) - step : 0.0;
+  const double distance_left = std::abs(left) - 0.5 * period * v, step = A * period;
+  const double stops = distance_left > 0.0 ? std::sqrt(step * step + 2.0 * A * distance_left) - step : 0.0;
   return side * std::clamp((std::min(stops, fastest_[j]) - v) / period, -A, A);
 }
 

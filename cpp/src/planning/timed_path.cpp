@@ -9,23 +9,24 @@
 namespace sidestep {
 namespace {
 
-constexpr double spacing = 0.05;          // of places [rad]
-constexpr double fine = 0.01;             // of stations [rad]
-constexpr double seen = 0.1;              // clearance from which it bounds no speed [m]
-constexpr double least_room = 0.001;      // [m]
-constexpr double left_to_the_arm = 0.95;  // of the limits
-constexpr double unmeasured = 0.35;       // of the limits
-constexpr double of_closing = 0.8;        // of the speed at which a clearance may close: rows that bind are not smooth
-constexpr double at_samples = 0.88;       // of the jerk: between samples it is up to an eighth more
+constexpr double spacing = 0.05;               // of places [rad]
+constexpr double fine = 0.01;                  // of stations [rad]
+constexpr double seen = 0.1;                   // clearance from which it bounds no speed [m]
+constexpr double least_distance_left = 0.001;  // [m]
+constexpr double left_to_the_arm = 0.95;       // of the limits
+constexpr double unmeasured = 0.35;            // of the limits
+constexpr double of_closing = 0.8;             // of the speed at which a clearance may close: rows that bind are not smooth
+constexpr double at_samples = 0.88;            // of the jerk: between samples it is up to an eighth more
 constexpr double of_effort = 0.7, of_effort_rate = 0.5;  // for motion along the path: the rest is for feedback, and clearances
 constexpr double least_share = 0.05;                     // of the acceleration limits, where gravity takes the effort
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
 constexpr double stopping =
     1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
 
-/// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this room may close.
-double closing_speed(double room, double A, double rate) {
-  return room <= A / (rate * rate) ? rate * room : std::sqrt(std::max(0.0, 2.0 * A * room - A * A / (rate * rate)));
+/// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this distance left may close.
+double closing_speed(double distance_left, double A, double rate) {
+  return distance_left <= A / (rate * rate) ? rate * distance_left
+                                            : std::sqrt(std::max(0.0, 2.0 * A * distance_left - A * A / (rate * rate)));
 }
 
 /// What motors leave of the limits of acceleration and jerk along a path.
@@ -150,9 +151,9 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Cl
       for (Eigen::Index k = 0; k + 1 < num; ++k) {
         const double slope = (clearances(i, k) - clearances(i, k + 1)) / (route.place_station[k + 1] - route.place_station[k]);
         if (slope > 1e-6) {
-          const double room = std::max(least_room, clearances(i, k + 1) - margin);
+          const double distance_left = std::max(least_distance_left, clearances(i, k + 1) - margin);
           const double A = safety.braking_fraction * slope * std::min(hardest[k], hardest[k + 1]);
-          between[k] = std::min(between[k], of_closing * closing_speed(room, A, safety.rate) / slope);
+          between[k] = std::min(between[k], of_closing * closing_speed(distance_left, A, safety.rate) / slope);
         }
       }
     }

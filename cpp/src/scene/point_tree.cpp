@@ -108,13 +108,13 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
 }
 
 PointTree::Level::Level(int count) : size(count) {
-  const std::size_t room = groups(static_cast<std::size_t>(count), fan_out) * fan_out + leaf_size - fan_out;
+  const std::size_t padded = groups(static_cast<std::size_t>(count), fan_out) * fan_out + leaf_size - fan_out;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    centre[axis].assign(room, padding);
-    half[axis].assign(room, 0.0);
+    centre[axis].assign(padded, padding);
+    half[axis].assign(padded, 0.0);
   }
-  largest.assign(room, 0.0);
-  radius.assign(room, 0.0);
+  largest.assign(padded, 0.0);
+  radius.assign(padded, 0.0);
 }
 
 void PointTree::refit() noexcept {

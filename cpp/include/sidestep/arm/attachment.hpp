@@ -47,13 +47,13 @@ struct RestingObject {
   std::vector<double> given;
 };
 
-/// The object with ellipsoids cut down to smaller ones inside them, which keep `room` [m] off the points of obstacles that it rests
+/// The object with ellipsoids cut down to smaller ones inside them, which keep `distance` [m] off the points of obstacles that it rests
 /// on. With the ellipsoid {c + A u : |u| <= 1} and a plane at w·u = β there, w a unit vector, the smaller one is
 /// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane, and the ellipsoid on the other side.
 /// Throws std::invalid_argument that names the object and an obstacle: one that there is not, that it is more than
-/// `deepest_rest` [m] deep in, or that an ellipsoid lies wholly within the room of.
+/// `deepest_rest` [m] deep in, or that an ellipsoid lies wholly within the distance of.
 RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
-                      double room);
+                      double distance);
 
 constexpr double deepest_rest = 0.03;
 

@@ -61,7 +61,7 @@ class GeometricSystem {
   /// Throws std::invalid_argument that names the setting at fault.
   GeometricSystem(Robot robot, std::vector<std::shared_ptr<const Embedding>> embeddings, GeometricSystemSettings settings);
 
-  /// The result of a step, and the room it needs.
+  /// The result of a step, and the memory it needs.
   class Workspace {
    public:
     explicit Workspace(const GeometricSystem& system);

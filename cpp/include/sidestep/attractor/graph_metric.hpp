@@ -45,7 +45,7 @@ class GraphMetric {
 
   Eigen::Index num_used_ = 0;            // coordinates with a gradient
   std::vector<Eigen::Index> used_;       // which ones
-  Eigen::MatrixXd jacobian_transposed_;  // their gradients, as columns, with room behind them
+  Eigen::MatrixXd jacobian_transposed_;  // their gradients, as columns, with space behind them
   Eigen::MatrixXd factor_;               // S if it is a number; else the Cholesky factor of S, or of G, top left
   Eigen::VectorXd along_;                // J x, then S⁻¹ J x
 };

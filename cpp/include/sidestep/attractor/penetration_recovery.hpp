@@ -45,7 +45,7 @@ struct PenetrationRecovery {
   void validate() const;
 };
 
-/// The push, and the room it needs.
+/// The push, and the memory it needs.
 class PenetrationRecoveryWorkspace {
  public:
   PenetrationRecoveryWorkspace(int nv, int m);

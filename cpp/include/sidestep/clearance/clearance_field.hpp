@@ -48,7 +48,7 @@ class ClearanceField final : public ClearanceGroup {
   CoordinateLabel label(int k) const override;
 
   /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches:
-  /// of points of which the room after a stop is below that of the horizon, wherever they are. No allocation.
+  /// of points whose distance left after a stop is below that of the horizon, wherever they are. No allocation.
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                 ClearanceView out) const noexcept override;
 

@@ -21,7 +21,7 @@ struct ClearanceView : ClearanceStateView {
   Eigen::Map<Eigen::VectorXd> least;    ///< (m) the smallest of those that h is the mean of [m]; +inf: beyond the reach
 };
 
-/// The room such views look into.
+/// The memory that such views show.
 struct ClearanceState {
   ClearanceState(int nv, int num)
       : values(Eigen::VectorXd::Constant(num, std::numeric_limits<double>::infinity())),

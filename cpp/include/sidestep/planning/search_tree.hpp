@@ -7,7 +7,7 @@
 namespace sidestep {
 
 /// A tree of configurations with the nearest of them found by a scan, which at some thousands of nodes is as fast as an
-/// index. Joints count by their weights w: |Δq| = √Σ (w_i Δq_i)². Room is taken once.
+/// index. Joints count by their weights w: |Δq| = √Σ (w_i Δq_i)². Memory is taken once.
 class SearchTree {
  public:
   /// weights: (nv), not negative; 0 for a joint that moves nothing.

@@ -58,7 +58,7 @@ class PointTree {
   };
 
   /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
-  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns
+  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that space, and returns
   /// those below `limit` as bits; measure(Boxes, ...) the same of boxes, which must not exceed that of a ball inside by
   /// more than what it is content to miss. (Boxes lie close to walls; balls around many of their points would reach far
   /// out.) The arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop`
@@ -97,7 +97,7 @@ class PointTree {
   int count(int leaf) const noexcept { return std::min(leaf_size, size() - leaf * leaf_size); }
 
  private:
-  /// The balls and boxes of all nodes, around the same centres, with room to read whole groups of `fan_out` nodes.
+  /// The balls and boxes of all nodes, around the same centres, with space to read whole groups of `fan_out` nodes.
   struct Level {
     int size;
     std::array<std::vector<double>, 3> centre, half;  // of the boxes of the points
