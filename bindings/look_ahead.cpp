@@ -137,7 +137,7 @@ void bind_look_ahead(nb::module_& m) {
             const Exclusive use(&self, "the look-ahead");
             return interruptible([&](const Interrupted& interrupted) {
               const InterruptedWhile look(&self, interrupted);
-              return self.look(target, position, velocity, seen, followed);
+              return self.update(target, position, velocity, seen, followed);
             });
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),

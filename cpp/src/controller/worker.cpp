@@ -116,7 +116,7 @@ void Worker::look_ahead_from(const Snapshot& s, Request& request, const Obstacle
   FoundTrajectory& found = look_ahead.buffer().draft();
   const std::optional<AvoidanceTrajectory> followed_now = s.avoiding ? std::optional(s.flight) : std::nullopt;
   const std::optional<AvoidanceTrajectory> best =
-      look_ahead.look_ahead().look(followed, s.q, s.v, obstacles, followed_now, leader);
+      look_ahead.look_ahead().update(followed, s.q, s.v, obstacles, followed_now, leader);
   found.time = s.time;
   found.request_number = s.request_number;
   found.avoid = best.has_value();

@@ -122,9 +122,9 @@ LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSet
   }
 }
 
-std::optional<AvoidanceTrajectory> LookAhead::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                                   const Obstacles& obstacles,
-                                                   const std::optional<AvoidanceTrajectory>& followed, const Leader& leader) {
+std::optional<AvoidanceTrajectory> LookAhead::update(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                                     const Obstacles& obstacles,
+                                                     const std::optional<AvoidanceTrajectory>& followed, const Leader& leader) {
   const auto usable = [this](const Eigen::VectorXd& x) { return x.size() == num_coordinates() && x.allFinite(); };
   if (!obstacles.tree().moves() || !usable(q) || !usable(v)) {
     return std::nullopt;
@@ -173,7 +173,7 @@ const AvoidanceTrajectory* LookAhead::pursue(const Goal& goal, const Eigen::Vect
   // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
   // number makes it look.
   if (is_due(period)) {
-    std::optional<AvoidanceTrajectory> next = look(goal, q, v, obstacles, found_, leader);
+    std::optional<AvoidanceTrajectory> next = update(goal, q, v, obstacles, found_, leader);
     until_look_ = std::max(until_look_ + settings_.delay, 0.0);
     pursued_ = std::exchange(found_, std::move(next));
   } else if (pursued_) {
@@ -189,10 +189,10 @@ void LookAhead::reset() noexcept {
   until_look_ = 0.0;
 }
 
-double LookAhead::obstacle_clearance() const noexcept {
+double LookAhead::obstacle_clearance(const Clearances& clearances) const noexcept {
   double least = infinity;
   for (const Eigen::Index k : of_obstacles_) {
-    least = std::min(least, workspace_.clearances.values[k]);
+    least = std::min(least, clearances.values[k]);
   }
   return least;
 }
@@ -219,7 +219,7 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
     wanted = workspace_.acceleration;
   }
   ++stepper.steps;
-  const double clearance = sees ? obstacle_clearance() : -infinity;
+  const double clearance = sees ? obstacle_clearance(workspace_.clearances) : -infinity;
   const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
   if (auto* program = std::get_if<TorqueController>(&stepper.limiter)) {
     dynamics_->mass_matrix(motion.q, *dynamics_workspace_, mass_);

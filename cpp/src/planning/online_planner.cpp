@@ -68,7 +68,7 @@ void OnlinePlanner::run() {
   while (!stopping_.load()) {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.planner.period)));
     if (!stopping_.load()) {
-      keeper_.look_at_newest();
+      keeper_.update_to_newest();
     }
   }
 }
@@ -132,7 +132,7 @@ void OnlinePlanner::tell(ConstVectorRef q, double time) {
   exchange_.states.submit();
   if (settings_.synchronous) {
     next_look_ = time + settings_.planner.period;
-    keeper_.look_at(exchange_.states.get());
+    keeper_.update(exchange_.states.get());
   } else if (first) {
     wake_.release();
   }

@@ -32,21 +32,21 @@ void PathKeeper::interrupt_when_overtaken(const std::atomic<bool>& stopping) {
   });
 }
 
-void PathKeeper::look_at_newest() {
+void PathKeeper::update_to_newest() {
   if (!exchange_.states.update() && !newer_) {
     return;
   }
   newer_ = false;
   const State state = exchange_.states.get();  // a copy: newer ones come while it looks
-  look_at(state);
+  update(state);
   exchange_.looked.draft() = {state.time,
                               std::chrono::duration<double>(std::chrono::steady_clock::now() - state.written).count()};
   exchange_.looked.submit();
 }
 
-void PathKeeper::look_at(const State& state) noexcept {
+void PathKeeper::update(const State& state) noexcept {
   try {
-    look(state);
+    check_way(state);
   } catch (...) {  // out of memory, for example: begin again at the next look
     have_path_ = direct_ = failed_ = improving_ = overtaken_ = false;
     changed_ = true;
@@ -54,7 +54,7 @@ void PathKeeper::look_at(const State& state) noexcept {
   }
 }
 
-void PathKeeper::look(const State& state) {
+void PathKeeper::check_way(const State& state) {
   if (state.goal_number == 0) {
     return;
   }

@@ -61,7 +61,7 @@ const std::vector<Field<LookAheadSettings>>& fields();
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
-/// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
+/// `update` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
 /// simulated time. One thread at a time.
 class LookAhead {
  public:
@@ -77,10 +77,10 @@ class LookAhead {
   /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the trajectory that is
   /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
   /// it is empty, as it is if nothing moves or the state is unusable. Allocates.
-  std::optional<AvoidanceTrajectory> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                          const Obstacles& obstacles,
-                                          const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
-                                          const Leader& leader = {});
+  std::optional<AvoidanceTrajectory> update(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                            const Obstacles& obstacles,
+                                            const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
+                                            const Leader& leader = {});
 
   /// The trajectory to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every
   /// `delay`, and follows what the look before found.
@@ -129,7 +129,7 @@ class LookAhead {
   /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that
   /// goes through an obstacle less, by what is left of the horizon then, at 1 m/s.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
-  double obstacle_clearance() const noexcept;
+  double obstacle_clearance(const Clearances& clearances) const noexcept;
   /// Random trajectories from a state, those first whose references get farthest before the body is deep in an
   /// obstacle.
   std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);

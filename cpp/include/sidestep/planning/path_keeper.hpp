@@ -16,7 +16,7 @@
 
 namespace sidestep {
 
-/// The part of an OnlinePlanner beside the loop: looks at the scene, finds paths and keeps to them.
+/// The part of an OnlinePlanner beside the loop: checks the scene, finds paths and keeps to them.
 ///
 /// At every state that it takes from the exchange it says whether the way ahead is still free among the newest obstacles and the
 /// arm makes progress, and searches again from where the arm is where that is not so; after a stop with a larger margin. One
@@ -30,10 +30,10 @@ class PathKeeper {
   /// All of them must outlive the keeper.
   PathKeeper(const ClearanceQuery& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange);
 
-  /// Looks at a state, and answers where something changes. What is thrown costs this look alone, not the process.
-  void look_at(const State& state) noexcept;
-  /// Looks at the newest state, unless it has, and says so.
-  void look_at_newest();
+  /// Checks the way of a state, and answers where something changes. What is thrown costs this update alone, not the process.
+  void update(const State& state) noexcept;
+  /// Updates to the newest state, unless it has, and says so.
+  void update_to_newest();
 
   /// Ends a search under way once it says so, as if time ran out.
   void interrupt_when(Interrupted interrupted) { search_.interrupt_when(std::move(interrupted)); }
@@ -41,7 +41,7 @@ class PathKeeper {
   void interrupt_when_overtaken(const std::atomic<bool>& stopping);
 
  private:
-  void look(const State& state);
+  void check_way(const State& state);
   void take_goal(const State& state);
   /// The margin [m] with which the way straight to the goal is taken; empty where a path is held on to, or it is not free.
   std::optional<double> straight_margin(const State& state, const Obstacles& obstacles, bool stuck);
