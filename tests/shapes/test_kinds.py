@@ -70,6 +70,9 @@ def test_triangles_are_inside_by_no_more_than_the_bulge(shape: Shape) -> None:
     assert farthest <= shape.bounding_radius + 1e-12  # rounding
     assert shape.bounding_radius == pytest.approx(farthest, abs=1e-3)
     assert shape.bulge <= 2.0 * BULGE * 0.1 + 1e-12
+    if shape.kind == "sphere":
+        nearest = np.linalg.norm(surface.triangles_center, axis=1).min()
+        assert 0.9 * shape.bulge < shape.bounding_radius - nearest <= shape.bulge
     shape.mesh().apply_translation([1.0, 0.0, 0.0])  # of a copy
     np.testing.assert_array_equal(shape.surface().vertices, surface.vertices)
 

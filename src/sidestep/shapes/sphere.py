@@ -10,6 +10,8 @@ import numpy as np
 from sidestep.shapes.shape import FINE, Array, Balls, Fineness, Points, Shape, Trimesh, metres
 from sidestep.shapes.surface_points import check_spacing, ring, ring_size, rings
 
+CUT_OFF = 0.0012  # of the radius, by the largest triangle of an icosahedron that is subdivided as `FINE` says
+
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Shape):
@@ -47,6 +49,11 @@ class Sphere(Shape):
             subdivisions=fineness.subdivisions, radius=self.radius
         )
         return triangles
+
+    @property
+    def bulge(self) -> float:
+        """More than the largest triangle cuts off."""
+        return CUT_OFF * self.radius
 
     @property
     def extents(self) -> tuple[float, ...]:
