@@ -30,6 +30,101 @@ int joint_above(const Robot& robot, int i, int j) {
   return i;
 }
 
+using Items = std::vector<ClearanceItem>;
+
+void add_reach(ClearanceItem& item, const Robot& robot, const LinkEllipsoids& link) {
+  // Up the chain, with a ball around the origin below that holds the link in every configuration.
+  double ball = 0.0;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // of that origin, from joint j
+  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
+  for (int j = link.joint; j != item.base;) {
+    const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];
+    double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
+    if (j == link.joint) {
+      for (const LinkEllipsoid& e : link.ellipsoids) {
+        radius = std::max(radius, across(e.mean, joint.axis) + e.extent);
+        next = std::max(next, e.mean.norm() + e.extent);
+      }
+    } else {
+      radius = across(offset, joint.axis) + ball;
+      next = offset.norm() + ball;
+    }
+    const bool turns = joint.type == JointType::revolute;
+    const double factor = std::abs(joint.multiplier), R = factor * (turns ? radius : 1.0);
+    item.reach[joint.coordinate] += R;
+    later[joint.coordinate] += R;
+    if (turns) {
+      // All later ones turn with it, and the pairs (i, j) and (j, i) count alike; itself once.
+      item.bend.row(joint.coordinate) += 2.0 * factor * later.transpose();
+      item.bend(joint.coordinate, joint.coordinate) -= factor * R;
+    } else {
+      const JointLimits& limits = robot.limits();
+      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
+      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
+      next += std::max(std::abs(low), std::abs(high));
+    }
+    ball = next;
+    offset = joint.X_PJ.translation();
+    j = joint.parent;
+  }
+}
+
+void add_obstacles(Items& items, const Robot& robot, const BodyLinks& links) {
+  for (int link = 0; link < links.size(); ++link) {
+    const LinkEllipsoids& ellipsoids = links[link];
+    if (ellipsoids.joint >= 0) {
+      items.emplace_back(Source::obstacles, link, CoordinateLabel{CoordinateLabel::Kind::obstacle, ellipsoids.name},
+                         robot.num_coordinates());
+      items.back().link = link;
+      add_reach(items.back(), robot, ellipsoids);
+    }
+  }
+}
+
+void add_pairs(Items& items, const Robot& robot, const BodyLinks& links, const PairClearances& pairs) {
+  for (int k = 0; k < pairs.size(); ++k) {
+    const PairClearances::Pair& of = pairs[k];
+    ClearanceItem& pair = items.emplace_back(Source::pair, k, pairs.label(k), robot.num_coordinates());
+    pair.contact = of.contact;
+    pair.link = of.first;
+    pair.other = of.second;
+    const LinkEllipsoids &first = links[of.first], &second = links[of.second];
+    pair.base = joint_above(robot, first.joint, second.joint);  // what is above it moves both alike
+    add_reach(pair, robot, first);
+    add_reach(pair, robot, second);
+    pair.most_margin = most_margin_of(pairs, k);
+  }
+}
+
+void add_plane(Items& items, const Robot& robot, const BodyLinks& links, const PlaneClearances& plane, int number) {
+  for (int k = 0; k < plane.size(); ++k) {
+    ClearanceItem& item = items.emplace_back(Source::plane, number, plane.label(k), robot.num_coordinates());
+    item.link = plane.link(k);
+    add_reach(item, robot, links[item.link]);
+  }
+}
+
+void add_tables(Items& items, const Robot& robot, const TableClearances& tables) {
+  for (int k = 0; k < tables.size(); ++k) {
+    const PairDistanceTable& table = tables[k];
+    ClearanceItem& item = items.emplace_back(Source::table, k, tables.label(k), robot.num_coordinates());
+    const Eigen::Vector2d steepest = table.steepest();
+    item.reach[table.axes[0].coordinate] = steepest[0];
+    item.reach[table.axes[1].coordinate] = steepest[1];
+    item.most_margin = most_margin_of(tables, k);
+  }
+}
+
+void add_loads(Items& items, const Robot& robot, const GravityTorqueLimit& limit) {
+  for (int k = 0; k < limit.size(); ++k) {
+    const GravityTorqueLimit::Load& load = limit.loads()[static_cast<std::size_t>(k)];
+    ClearanceItem& item = items.emplace_back(Source::load, k, limit.label(k), robot.num_coordinates());
+    item.reach = load.steepest;
+    item.bend = load.bend;
+    item.most_margin = ClearanceGroup::margin_share * load.activation;
+  }
+}
+
 }  // namespace
 
 ClearanceItem::ClearanceItem(Source from, int number, CoordinateLabel what, Eigen::Index nv)
@@ -57,111 +152,19 @@ ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<
   if (gravity_torque) {
     gravity_torque_ = std::make_shared<GravityTorqueLimit>(*std::move(gravity_torque));
   }
-  add_obstacles();
-  add_pairs();
-  add_planes();
-  add_tables();
-  add_loads();
-  stack_bounds();
-}
-
-void ClearanceItems::add_obstacles() {
-  for (int link = 0; link < links_->size(); ++link) {
-    const LinkEllipsoids& ellipsoids = (*links_)[link];
-    if (ellipsoids.joint >= 0) {
-      items_.emplace_back(Source::obstacles, link, CoordinateLabel{CoordinateLabel::Kind::obstacle, ellipsoids.name},
-                          robot_.num_coordinates());
-      items_.back().link = link;
-      add_reach(items_.back(), ellipsoids);
-    }
+  add_obstacles(items_, robot_, *links_);
+  if (pairs_) {
+    add_pairs(items_, robot_, *links_, *pairs_);
   }
-}
-
-void ClearanceItems::add_pairs() {
-  for (int k = 0; pairs_ && k < pairs_->size(); ++k) {
-    const PairClearances::Pair& links = (*pairs_)[k];
-    ClearanceItem& pair = items_.emplace_back(Source::pair, k, pairs_->label(k), robot_.num_coordinates());
-    pair.contact = links.contact;
-    pair.link = links.first;
-    pair.other = links.second;
-    const LinkEllipsoids &first = (*links_)[links.first], &second = (*links_)[links.second];
-    pair.base = joint_above(robot_, first.joint, second.joint);  // what is above it moves both alike
-    add_reach(pair, first);
-    add_reach(pair, second);
-    pair.most_margin = most_margin_of(*pairs_, k);
-  }
-}
-
-void ClearanceItems::add_planes() {
   for (int n = 0; n < static_cast<int>(planes_.size()); ++n) {
-    const PlaneClearances& plane = *planes_[static_cast<std::size_t>(n)];
-    for (int k = 0; k < plane.size(); ++k) {
-      items_.emplace_back(Source::plane, n, plane.label(k), robot_.num_coordinates());
-      items_.back().link = plane.link(k);
-      add_reach(items_.back(), (*links_)[plane.link(k)]);
-    }
+    add_plane(items_, robot_, *links_, *planes_[static_cast<std::size_t>(n)], n);
   }
-}
-
-void ClearanceItems::add_reach(ClearanceItem& item, const LinkEllipsoids& link) const {
-  // Up the chain, with a ball around the origin below that holds the link in every configuration.
-  double ball = 0.0;
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // of that origin, from joint j
-  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
-  for (int j = link.joint; j != item.base;) {
-    const Joint& joint = robot_.joints()[static_cast<std::size_t>(j)];
-    double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
-    if (j == link.joint) {
-      for (const LinkEllipsoid& e : link.ellipsoids) {
-        radius = std::max(radius, across(e.mean, joint.axis) + e.extent);
-        next = std::max(next, e.mean.norm() + e.extent);
-      }
-    } else {
-      radius = across(offset, joint.axis) + ball;
-      next = offset.norm() + ball;
-    }
-    const bool turns = joint.type == JointType::revolute;
-    const double factor = std::abs(joint.multiplier), R = factor * (turns ? radius : 1.0);
-    item.reach[joint.coordinate] += R;
-    later[joint.coordinate] += R;
-    if (turns) {
-      // All later ones turn with it, and the pairs (i, j) and (j, i) count alike; itself once.
-      item.bend.row(joint.coordinate) += 2.0 * factor * later.transpose();
-      item.bend(joint.coordinate, joint.coordinate) -= factor * R;
-    } else {
-      const JointLimits& limits = robot_.limits();
-      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
-      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
-      next += std::max(std::abs(low), std::abs(high));
-    }
-    ball = next;
-    offset = joint.X_PJ.translation();
-    j = joint.parent;
+  if (tables_) {
+    add_tables(items_, robot_, *tables_);
   }
-}
-
-void ClearanceItems::add_tables() {
-  for (int k = 0; tables_ && k < tables_->size(); ++k) {
-    const PairDistanceTable& table = (*tables_)[k];
-    ClearanceItem& item = items_.emplace_back(Source::table, k, tables_->label(k), robot_.num_coordinates());
-    const Eigen::Vector2d steepest = table.steepest();
-    item.reach[table.axes[0].coordinate] = steepest[0];
-    item.reach[table.axes[1].coordinate] = steepest[1];
-    item.most_margin = most_margin_of(*tables_, k);
+  if (gravity_torque_) {
+    add_loads(items_, robot_, *gravity_torque_);
   }
-}
-
-void ClearanceItems::add_loads() {
-  for (int k = 0; gravity_torque_ && k < gravity_torque_->size(); ++k) {
-    const GravityTorqueLimit::Load& load = gravity_torque_->loads()[static_cast<std::size_t>(k)];
-    ClearanceItem& item = items_.emplace_back(Source::load, k, gravity_torque_->label(k), robot_.num_coordinates());
-    item.reach = load.steepest;
-    item.bend = load.bend;
-    item.most_margin = ClearanceGroup::margin_share * load.activation;
-  }
-}
-
-void ClearanceItems::stack_bounds() {
   const Eigen::Index nv = robot_.num_coordinates();
   reach_ = Eigen::VectorXd::Zero(nv);
   reaches_.resize(size(), nv);

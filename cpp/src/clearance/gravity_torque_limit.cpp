@@ -27,6 +27,31 @@ double farthest_place(const Robot& robot, const Joint& joint) noexcept {
   return length;
 }
 
+/// What every joint carries, itself included.
+struct Burdens {
+  std::vector<double> mass, moment;       // [kg], and the largest about the joint's origin [kg m]
+  std::vector<std::vector<int>> carried;  // joints, itself first
+};
+
+Burdens burdens(const Robot& robot, const std::vector<Inertial>& inertials) {
+  const std::vector<Joint>& joints = robot.joints();
+  const auto num = joints.size();
+  Burdens all{std::vector<double>(num), std::vector<double>(num), std::vector<std::vector<int>>(num)};
+  auto& [mass, moment, carried] = all;
+  for (std::size_t i = num; i-- > 0;) {
+    mass[i] += inertials[i].mass;
+    moment[i] += inertials[i].mass * inertials[i].com.norm();
+    carried[i].insert(carried[i].begin(), static_cast<int>(i));
+    if (joints[i].parent >= 0) {
+      const auto parent = static_cast<std::size_t>(joints[i].parent);
+      mass[parent] += mass[i];
+      moment[parent] += moment[i] + (mass[i] > 0.0 ? mass[i] * farthest_place(robot, joints[i]) : 0.0);
+      carried[parent].insert(carried[parent].end(), carried[i].begin(), carried[i].end());
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
 GravityTorqueLimit::GravityTorqueLimit(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most)
@@ -34,20 +59,9 @@ GravityTorqueLimit::GravityTorqueLimit(const RigidBodyDynamics& dynamics, const 
   const std::vector<Joint>& joints = robot_.joints();
   const auto num = joints.size();
   const auto nv = robot_.num_coordinates();
-  // Mass, and the largest moment about the joint's origin, of what every joint carries.
-  std::vector<double> mass(num), moment(num);
-  std::vector<std::vector<int>> carried(num);
-  for (std::size_t i = num; i-- > 0;) {
-    mass[i] += inertials_[i].mass;
-    moment[i] += inertials_[i].mass * inertials_[i].com.norm();
-    carried[i].insert(carried[i].begin(), static_cast<int>(i));
-    if (joints[i].parent >= 0) {
-      const auto parent = static_cast<std::size_t>(joints[i].parent);
-      mass[parent] += mass[i];
-      moment[parent] += moment[i] + (mass[i] > 0.0 ? mass[i] * farthest_place(robot_, joints[i]) : 0.0);
-      carried[parent].insert(carried[parent].end(), carried[i].begin(), carried[i].end());
-    }
-  }
+  const Burdens of_joints = burdens(robot_, inertials_);
+  const std::vector<double>&mass = of_joints.mass, &moment = of_joints.moment;
+  const std::vector<std::vector<int>>& carried = of_joints.carried;
   const double g = gravity_.norm();
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(nv), weight = largest;
   // Derivatives of the potential energy are bounded by the moment, or the weight, of what the last of their joints carries, if those

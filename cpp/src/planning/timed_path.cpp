@@ -65,6 +65,26 @@ class TorqueReserve {
   Eigen::VectorXd gravity_, rest_;
 };
 
+/// Largest ds/dt between neighbouring places [1/s] with which no clearance (items × places) [m] closes too fast, `hardest` the d²s/dt²
+/// that there is at the places.
+Eigen::VectorXd speeds_between(const Eigen::MatrixXd& clearances, const Eigen::VectorXd& stations,
+                               const Eigen::VectorXd& hardest, const SafetySettings& safety) {
+  const Eigen::Index num = stations.size();
+  Eigen::VectorXd between = Eigen::VectorXd::Constant(std::max<Eigen::Index>(1, num - 1), infinity);
+  for (Eigen::Index i = 0; i < clearances.rows(); ++i) {
+    const double margin = std::min(safety.margin, clearances.row(i).minCoeff());
+    for (Eigen::Index k = 0; k + 1 < num; ++k) {
+      const double slope = (clearances(i, k) - clearances(i, k + 1)) / (stations[k + 1] - stations[k]);
+      if (slope > 1e-6) {
+        const double distance_left = std::max(least_distance_left, clearances(i, k + 1) - margin);
+        const double A = safety.braking_fraction * slope * std::min(hardest[k], hardest[k + 1]);
+        between[k] = std::min(between[k], of_closing * closing_speed(distance_left, A, safety.rate) / slope);
+      }
+    }
+  }
+  return between;
+}
+
 }  // namespace
 
 template <>
@@ -145,18 +165,7 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Cl
   }
   Eigen::VectorXd fastest = Eigen::VectorXd::Constant(stations.size(), infinity);
   if (measured) {
-    Eigen::VectorXd between = Eigen::VectorXd::Constant(std::max<Eigen::Index>(1, num - 1), infinity);
-    for (int i = 0; i < body.num_items(); ++i) {
-      const double margin = std::min(safety.margin, clearances.row(i).minCoeff());
-      for (Eigen::Index k = 0; k + 1 < num; ++k) {
-        const double slope = (clearances(i, k) - clearances(i, k + 1)) / (route.place_station[k + 1] - route.place_station[k]);
-        if (slope > 1e-6) {
-          const double distance_left = std::max(least_distance_left, clearances(i, k + 1) - margin);
-          const double A = safety.braking_fraction * slope * std::min(hardest[k], hardest[k + 1]);
-          between[k] = std::min(between[k], of_closing * closing_speed(distance_left, A, safety.rate) / slope);
-        }
-      }
-    }
+    const Eigen::VectorXd between = speeds_between(clearances, route.place_station, hardest, safety);
     for (Eigen::Index i = 0; i < stations.size() && num > 1; ++i) {
       fastest[i] = between[place_before(stations[i])];
     }

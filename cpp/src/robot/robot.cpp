@@ -74,6 +74,33 @@ std::uint64_t hash_of(const std::vector<Joint>& joints, const std::vector<std::s
   return hash.value();
 }
 
+void check_joint(const Joint& joint, int i, int nv) {
+  const std::string owner = "joint '" + joint.name + "'";
+  if (joint.parent < -1 || joint.parent >= i) {
+    throw std::invalid_argument(owner + ": parent index " + std::to_string(joint.parent) +
+                                " must be -1 (base) or that of an earlier joint (joint index " + std::to_string(i) + ")");
+  }
+  if (joint.coordinate < 0 || joint.coordinate >= nv) {
+    throw std::invalid_argument(owner + ": coordinate " + std::to_string(joint.coordinate) + " is outside 0.." +
+                                std::to_string(nv - 1));
+  }
+  if (!(std::abs(joint.axis.norm() - 1.0) < unit_axis_tolerance)) {
+    throw std::invalid_argument(owner + ": axis must have unit length");
+  }
+  if (!std::isfinite(joint.multiplier) || !std::isfinite(joint.offset)) {
+    throw std::invalid_argument(owner + ": mimic multiplier and offset must be finite");
+  }
+  check_placement(joint.X_PJ, owner);
+}
+
+void check_frame(const Frame& frame, int num_joints) {
+  if (frame.joint < -1 || frame.joint >= num_joints) {
+    throw std::invalid_argument("frame '" + frame.name + "': joint index " + std::to_string(frame.joint) + " is outside -1.." +
+                                std::to_string(num_joints - 1));
+  }
+  check_placement(frame.X_JF, "frame '" + frame.name + "'");
+}
+
 }  // namespace
 
 JointLimits JointLimits::unlimited(int num) {
@@ -96,22 +123,7 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
   std::vector<bool> driven(coordinate_names_.size(), false);
   for (int i = 0; i < num_joints(); ++i) {
     const Joint& joint = joints_[static_cast<std::size_t>(i)];
-    const std::string owner = "joint '" + joint.name + "'";
-    if (joint.parent < -1 || joint.parent >= i) {
-      throw std::invalid_argument(owner + ": parent index " + std::to_string(joint.parent) +
-                                  " must be -1 (base) or that of an earlier joint (joint index " + std::to_string(i) + ")");
-    }
-    if (joint.coordinate < 0 || joint.coordinate >= nv) {
-      throw std::invalid_argument(owner + ": coordinate " + std::to_string(joint.coordinate) + " is outside 0.." +
-                                  std::to_string(nv - 1));
-    }
-    if (!(std::abs(joint.axis.norm() - 1.0) < unit_axis_tolerance)) {
-      throw std::invalid_argument(owner + ": axis must have unit length");
-    }
-    if (!std::isfinite(joint.multiplier) || !std::isfinite(joint.offset)) {
-      throw std::invalid_argument(owner + ": mimic multiplier and offset must be finite");
-    }
-    check_placement(joint.X_PJ, owner);
+    check_joint(joint, i, nv);
     driven[static_cast<std::size_t>(joint.coordinate)] = true;
   }
   for (std::size_t i = 0; i < driven.size(); ++i) {
@@ -120,11 +132,7 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
     }
   }
   for (const Frame& frame : frames_) {
-    if (frame.joint < -1 || frame.joint >= num_joints()) {
-      throw std::invalid_argument("frame '" + frame.name + "': joint index " + std::to_string(frame.joint) +
-                                  " is outside -1.." + std::to_string(num_joints() - 1));
-    }
-    check_placement(frame.X_JF, "frame '" + frame.name + "'");
+    check_frame(frame, num_joints());
   }
   check_limit(limits_.velocity, "velocity", coordinate_names_);
   check_limit(limits_.acceleration, "acceleration", coordinate_names_);

@@ -78,14 +78,6 @@ class ClearanceItems {
   const Eigen::MatrixXd& bends() const noexcept { return bends_; }
 
  private:
-  void add_obstacles();
-  void add_pairs();
-  void add_planes();
-  void add_tables();
-  void add_loads();
-  void add_reach(ClearanceItem& item, const LinkEllipsoids& link) const;
-  void stack_bounds();
-
   Robot robot_;
   std::shared_ptr<const BodyLinks> links_;
   std::shared_ptr<const ClearanceField> obstacles_;
