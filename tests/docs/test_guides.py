@@ -31,15 +31,6 @@ def test_a_setting_is_in_the_two_tables_and_where_it_is_used() -> None:
     assert len(found) == 3
 
 
-def test_the_example_of_a_setting_is_the_code() -> None:
-    blocks = re.findall(
-        r"^```cpp\n(.*?)^```$", (GUIDES / "add-a-setting.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
-    )
-    for block, name in zip(blocks, first_table("add-a-setting.md"), strict=True):
-        code = (ROOT / name).read_text("utf-8")
-        assert [line for line in block.splitlines() if line.strip() not in code] == []
-
-
 def test_the_place_of_a_driver_is_told_until_there_is_one() -> None:
     text = (GUIDES / "add-a-driver.md").read_text("utf-8")
     for folder in ("src/sidestep/drivers", "cpp/src/loop"):
