@@ -11,9 +11,8 @@
 #include "module.hpp"
 #include "settings.hpp"
 #include "sidestep/constraints/acceleration_bounds.hpp"
-#include "sidestep/constraints/acceleration_filter.hpp"
 #include "sidestep/math/quadratic_program.hpp"
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 
 namespace sidestep::python {
 namespace {
@@ -43,10 +42,6 @@ QuadraticProgramData without_unbounded_rows(const QuadraticProgramData& data) {
   result.row_upper = data.row_upper(bounded);
   return result;
 }
-
-constexpr const char* program_doc =
-    "The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];\n"
-    "rows without bounds are left out.";
 
 void bind_quadratic_program(nb::module_& m) {
   nb::enum_<QuadraticProgramStatus>(m, "QuadraticProgramStatus", "How a quadratic program ended.")
@@ -238,7 +233,7 @@ void bind_safety(nb::module_& m) {
   bind_settings<SafetySettings>(m, "SafetySettings", "What every command keeps of clearances, of which the margin may be less: `Clearances.margins`.");
 }
 
-void bind_torque_controller(nb::module_& m) {
+void bind_motion_status(nb::module_& m) {
   nb::enum_<TorqueStatus>(m, "TorqueStatus", "How a control step ended, from best to worst.")
       .value("ok", TorqueStatus::ok, "tracked, no limit in the way")
       .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
@@ -258,7 +253,9 @@ void bind_torque_controller(nb::module_& m) {
       .value("bias", TorqueFault::bias)
       .value("clearances", TorqueFault::clearances)
       .def("__str__", [](TorqueFault fault) { return name(fault); });
+}
 
+void bind_motion_solution(nb::module_& m) {
   nb::class_<SafetyRow>(m, "SafetyRow", "What one control step did about one clearance.")
       .def_ro("coordinate", &SafetyRow::coordinate, "Which clearance.")
       .def_ro("nearest", &SafetyRow::nearest, "Its nearest obstacle point.")
@@ -300,42 +297,78 @@ void bind_torque_controller(nb::module_& m) {
               "The least clearance given [m], exact, with a row or without; inf if there is none.")
       .def_ro("least_coordinate", &TorqueSolution::least_coordinate, "Which clearance that is; -1 if there is none.")
       .def_ro("least_nearest", &TorqueSolution::least_nearest, "Its nearest obstacle point; -1 if there is none.");
+}
 
-  nb::class_<TorqueController>(m, "TorqueController",
-                               "Torque that tracks a wanted acceleration within every limit of the arm:\n"
-                               "minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to\n"
-                               "M x + h = torque, |torque| <= effort limit, lower(q, v) <= x <= upper(q, v).\n"
-                               "Source: Bosc, equation T6.3, corrected. One object per thread.")
+void make_motion_program(MotionProgram* self, const Robot& robot, double period, bool by_torque, const ArrayLike& tracking_weight,
+                         const ArrayLike& torque_weight, double slack_weight, double velocity_overrun,
+                         double acceleration_overrun, double position_margin, double stop_time, double stop_damping,
+                         const SafetySettings* safety) {
+  const int nv = robot.num_coordinates();
+  MotionProgramSettings settings;
+  settings.period = period;
+  settings.by_torque = by_torque;
+  settings.tracking_weight = as_filled_vector(tracking_weight, "tracking_weight", nv);
+  settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
+  settings.slack_weight = slack_weight;
+  settings.velocity_overrun = velocity_overrun;
+  settings.acceleration_overrun = acceleration_overrun;
+  settings.safety = safety == nullptr ? SafetySettings() : *safety;
+  settings.position_margin = position_margin;
+  settings.stop_time = stop_time;
+  settings.stop_damping = stop_damping;
+  new (self) MotionProgram(robot, std::move(settings));
+}
+
+TorqueSolution solve_motion_program(MotionProgram& program, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,
+                                    const std::optional<ArrayLike>& mass_matrix, const std::optional<ArrayLike>& bias,
+                                    nb::handle clearances, const std::optional<ArrayLike>& last_acceleration,
+                                    const std::optional<ArrayLike>& last_torque) {
+  const int nv = program.num_coordinates();
+  if (program.settings().by_torque && !(mass_matrix && bias)) {
+    throw nb::value_error("mass_matrix and bias must be given to an arm that is moved by torque");
+  }
+  TorqueSolution solution(nv, program.settings().safety.max_rows);
+  nb::object keep;
+  LastCommand last;
+  Eigen::VectorXd a, torque, h;
+  Eigen::MatrixXd M;
+  if (mass_matrix && bias) {
+    M = as_matrix(*mass_matrix, "mass_matrix", nv, nv);
+    h = as_vector(*bias, "bias", nv);
+  }
+  if (last_acceleration) {
+    a = as_finite_vector(*last_acceleration, "last_acceleration", nv);
+    last.acceleration = &a;
+  }
+  if (last_torque) {
+    torque = as_finite_vector(*last_torque, "last_torque", nv);
+    last.torque = &torque;
+  }
+  const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
+                        wanted = as_vector(acceleration, "acceleration", nv);
+  static_cast<void>(
+      program.solve({position, velocity, wanted, M, h, as_clearances(clearances, keep), {}, last}, solution));
+  return solution;
+}
+
+void bind_motion_program(nb::module_& m) {
+  const MotionProgramSettings defaults;
+  nb::class_<MotionProgram>(m, "MotionProgram",
+                            "The acceleration, and the torque for it, nearest to a wanted one within every limit of the arm and its\n"
+                            "clearances: minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to\n"
+                            "M x + h = torque, |torque| <= effort limit, lower(q, v) <= x <= upper(q, v).\n"
+                            "Source: Bosc, equation T6.3, corrected. One object per thread.")
       .def(
           "__init__",
-          [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
-             const ArrayLike& torque_weight, double slack_weight, double velocity_overrun, double acceleration_overrun,
-             double position_margin, double stop_time, double stop_damping, const SafetySettings* safety) {
-            const int nv = robot.num_coordinates();
-            TorqueControllerSettings settings;
-            settings.period = period;
-            settings.tracking_weight = as_filled_vector(tracking_weight, "tracking_weight", nv);
-            settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
-            settings.slack_weight = slack_weight;
-            settings.velocity_overrun = velocity_overrun;
-            settings.acceleration_overrun = acceleration_overrun;
-            settings.safety = safety == nullptr ? SafetySettings() : *safety;
-            settings.position_margin = position_margin;
-            settings.stop_time = stop_time;
-            settings.stop_damping = stop_damping;
-            new (self) TorqueController(robot, std::move(settings));
-          },
-          nb::arg("robot"), nb::kw_only(), nb::arg("period") = TorqueControllerSettings().period,
-          nb::arg("tracking_weight") = TorqueControllerSettings().tracking_weight[0],
-          nb::arg("torque_weight") = TorqueControllerSettings().torque_weight[0],
-          nb::arg("slack_weight") = TorqueControllerSettings().slack_weight,
-          nb::arg("velocity_overrun") = TorqueControllerSettings().velocity_overrun,
-          nb::arg("acceleration_overrun") = TorqueControllerSettings().acceleration_overrun,
-          nb::arg("position_margin") = TorqueControllerSettings().position_margin,
-          nb::arg("stop_time") = TorqueControllerSettings().stop_time,
-          nb::arg("stop_damping") = TorqueControllerSettings().stop_damping,
-          nb::arg("safety") = nb::none(),
-          "period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
+          make_motion_program,
+          nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period, nb::arg("by_torque") = defaults.by_torque,
+          nb::arg("tracking_weight") = defaults.tracking_weight[0], nb::arg("torque_weight") = defaults.torque_weight[0],
+          nb::arg("slack_weight") = defaults.slack_weight, nb::arg("velocity_overrun") = defaults.velocity_overrun,
+          nb::arg("acceleration_overrun") = defaults.acceleration_overrun,
+          nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,
+          nb::arg("stop_damping") = defaults.stop_damping, nb::arg("safety") = nb::none(),
+          "period [s]: time between two steps; by_torque: whether the arm is moved by torque: otherwise velocity and\n"
+          "acceleration limits never give way, and no effort is limited; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
           "torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the\n"
           "steepest tracking cost; velocity_overrun, acceleration_overrun [-], >= 1: the factor up to which those limits\n"
           "give way to clearances and torque limits;\n"
@@ -344,86 +377,27 @@ void bind_torque_controller(nb::module_& m) {
           "safety: SafetySettings, by default as they are. Raises ValueError that names the setting.")
       .def(
           "solve",
-          [](TorqueController& controller, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration, const ArrayLike& mass_matrix,
-             const ArrayLike& bias, nb::handle clearances, const std::optional<ArrayLike>& last_acceleration,
-             const std::optional<ArrayLike>& last_torque) {
-            const int nv = controller.num_coordinates();
-            TorqueSolution solution(nv, controller.settings().safety.max_rows);
-            nb::object keep;
-            LastCommand last;
-            Eigen::VectorXd a, torque;
-            if (last_acceleration) {
-              a = as_finite_vector(*last_acceleration, "last_acceleration", nv);
-              last.acceleration = &a;
-            }
-            if (last_torque) {
-              torque = as_finite_vector(*last_torque, "last_torque", nv);
-              last.torque = &torque;
-            }
-            static_cast<void>(controller.solve(as_vector(q, "q", nv), as_vector(v, "v", nv),
-                                               as_vector(acceleration, "acceleration", nv),
-                                               as_matrix(mass_matrix, "mass_matrix", nv, nv),
-                                               as_vector(bias, "bias", nv), as_clearances(clearances, keep), {}, last,
-                                               solution));
-            return solution;
-          },
-          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix"), nb::arg("bias"), nb::kw_only(),
-          nb::arg("clearances").none() = nb::none(), nb::arg("last_acceleration") = nb::none(), nb::arg("last_torque") = nb::none(),
+          solve_motion_program,
+          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix") = nb::none(),
+          nb::arg("bias") = nb::none(), nb::kw_only(), nb::arg("clearances").none() = nb::none(),
+          nb::arg("last_acceleration") = nb::none(), nb::arg("last_torque") = nb::none(),
           nb::sig("def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-                  "acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, "
-                  "bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None, "
+                  "acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, "
+                  "bias: numpy.typing.ArrayLike | None = None, *, clearances: Clearances | Step | None = None, "
                   "last_acceleration: numpy.typing.ArrayLike | None = None, "
                   "last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution"),
           "One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),\n"
-          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. With the last\n"
-          "period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits. Returns a\n"
-          "TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
-      .def_prop_ro("num_coordinates", &TorqueController::num_coordinates, "Number of joint coordinates nv.")
-      .def_prop_ro("program", [](const TorqueController& c) { return without_unbounded_rows(c.program()); }, program_doc)
-      .def("count", &TorqueController::count, nb::arg("status"), "Number of solves that ended with this status.");
-}
-
-void bind_acceleration_filter(nb::module_& m) {
-  const AccelerationFilterSettings defaults;
-  nb::class_<AccelerationFilter>(
-      m, "AccelerationFilter",
-      "The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:\n"
-      "TorqueController with unit masses and unlimited effort. Position, velocity and acceleration limits are never\n"
-      "left; only clearances can give way (status relaxed_safety). One object per thread.")
-      .def(
-          "__init__",
-          [](AccelerationFilter* self, const Robot& robot, double period, double position_margin, double stop_time,
-             const SafetySettings* safety) {
-            new (self) AccelerationFilter(
-                robot, {period, position_margin, stop_time, safety == nullptr ? SafetySettings() : *safety});
-          },
-          nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period,
-          nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,
-          nb::arg("safety") = nb::none(),
-          "period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop\n"
-          "for unusable input; safety: SafetySettings, by default as they are. Raises ValueError that names the setting.")
-      .def(
-          "apply",
-          [](AccelerationFilter& filter, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,
-             nb::handle clearances) {
-            const int nv = filter.num_coordinates();
-            TorqueSolution solution(nv, filter.max_safety_rows());
-            nb::object keep;
-            static_cast<void>(filter.apply(as_vector(q, "q", nv), as_vector(v, "v", nv),
-                                           as_vector(acceleration, "acceleration", nv),
-                                           as_clearances(clearances, keep), solution));
-            return solution;
-          },
-          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::kw_only(), nb::arg("clearances").none() = nb::none(),
-          nb::sig("def apply(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-                  "acceleration: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) "
-                  "-> TorqueSolution"),
-          "q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], clearances at (q, v), which a Step has.\n"
-          "Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.")
-      .def_prop_ro("period", &AccelerationFilter::period, "[s] between two calls.")
-      .def_prop_ro("num_coordinates", &AccelerationFilter::num_coordinates, "Number of joint coordinates nv.")
-      .def_prop_ro("program", [](const AccelerationFilter& f) { return without_unbounded_rows(f.program()); }, program_doc)
-      .def("count", &AccelerationFilter::count, nb::arg("status"), "Number of calls that ended with this status.");
+          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity; both only if by_torque), clearances at (q, v), which a Step\n"
+          "has. With the last period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits.\n"
+          "Returns a TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on\n"
+          "wrong shapes.")
+      .def_prop_ro("period", [](const MotionProgram& p) { return p.settings().period; }, "[s] between two calls.")
+      .def_prop_ro("by_torque", [](const MotionProgram& p) { return p.settings().by_torque; }, "Whether the arm is moved by torque.")
+      .def_prop_ro("num_coordinates", &MotionProgram::num_coordinates, "Number of joint coordinates nv.")
+      .def_prop_ro("program", [](const MotionProgram& p) { return without_unbounded_rows(p.program()); },
+                   "The first quadratic program of the last call that had usable input, over the acceleration\n"
+                   "[rad/s^2 | m/s^2]; rows without bounds are left out.")
+      .def("count", &MotionProgram::count, nb::arg("status"), "Number of solves that ended with this status.");
 }
 
 }  // namespace
@@ -432,8 +406,9 @@ void bind_control(nb::module_& m) {
   bind_quadratic_program(m);
   bind_acceleration_bounds(m);
   bind_safety(m);
-  bind_torque_controller(m);
-  bind_acceleration_filter(m);
+  bind_motion_status(m);
+  bind_motion_solution(m);
+  bind_motion_program(m);
 }
 
 }  // namespace sidestep::python

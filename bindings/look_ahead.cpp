@@ -74,7 +74,7 @@ void bind_look_ahead(nb::module_& m) {
   nb::class_<AvoidanceTrajectory>(m, "AvoidanceTrajectory",
                      "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its\n"
                      "limits allow, and the acceleration that follows it. It ignores obstacles: the acceleration is for an\n"
-                     "AccelerationFilter or a TorqueController with clearances. Raises ValueError on wrong shapes and what is\n"
+                     "MotionProgram with clearances. Raises ValueError on wrong shapes and what is\n"
                      "not finite.")
       .def(
           "__init__",
@@ -105,7 +105,7 @@ void bind_look_ahead(nb::module_& m) {
 
   nb::class_<LookAhead>(m, "LookAhead",
                       "Leads an arm out of the way of what moves, in time, where a barrier would back off along the line of\n"
-                      "approach until a joint limit stops the arm. A look integrates the system, as an AccelerationFilter lets\n"
+                      "approach until a joint limit stops the arm. A look integrates the system, as a MotionProgram lets\n"
                       "it, with the obstacles moving on as they do; where that comes nearer to them than `clearance` [m] within\n"
                       "`horizon` [s], it looks for an AvoidanceTrajectory to one of `tries` random configurations that does not,\n"
                       "to be followed until the way to the goal is free. One thread at a time. period [s]: of the steps looked\n"

@@ -1,4 +1,4 @@
-// Time of one TorqueController step of a 7-joint arm, on random states of three kinds: nothing in the way, states and
+// Time of one MotionProgram step of a 7-joint arm, on random states of three kinds: nothing in the way, states and
 // wanted accelerations at the limits, and loads so high that the bounds must be relaxed; then the same with clearances,
 // by how many of them bend the motion, for torque control and for the filter of motion without torque. Prints
 // percentiles in microseconds, steady clock included (about 0.03).
@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "sidestep/constraints/acceleration_filter.hpp"
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "support/serial_arm.hpp"
+#include "support/without_torque.hpp"
 
 namespace {
 
@@ -46,7 +46,7 @@ void print(Times& times) {
 
 void without_clearances() {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   test::Random random(0);
   Times times;
@@ -61,7 +61,7 @@ void without_clearances() {
     }
     const Eigen::VectorXd a = (at_limits ? random.magnitude(1.0, 300.0) : 1.0) * random.vector(nv);
     const Eigen::MatrixXd M = test::random_mass(random, nv);
-    time_rounds(times, "no clearances, ", [&] { return controller.solve(q, v, a, M, h, solution); });
+    time_rounds(times, "no clearances, ", [&] { return controller.solve({q, v, a, M, h}, solution); });
   }
   print(times);
 }
@@ -70,8 +70,8 @@ void without_clearances() {
 /// wants to go anywhere: about half of the rows are violated by it.
 void with_clearances(int num) {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv);
   test::Random random(1);
   Times times;
@@ -94,9 +94,10 @@ void with_clearances(int num) {
       clearances.curvatures[n] = -random.uniform(0.0, 0.3);
     }
     std::snprintf(label, sizeof label, "%2d clearances, torque, ", num);
-    time_rounds(times, label, [&] { return controller.solve(q, v, a, M, h, &clearances, solution); });
+    time_rounds(times, label, [&] { return controller.solve({q, v, a, M, h, &clearances}, solution); });
     std::snprintf(label, sizeof label, "%2d clearances, filter, ", num);
-    time_rounds(times, label, [&] { return filter.apply(q, v, a, &clearances, solution); });
+    time_rounds(times, label,
+                [&] { return filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, solution); });
   }
   print(times);
 }

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "scenes.hpp"
-#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "sidestep/attractor/geometric_system.hpp"
 #include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/thesis/collision_density.hpp"
@@ -46,7 +46,9 @@ int main(int argc, char** argv) {
   settings.damping = 3.0 * Eigen::MatrixXd::Identity(nv, nv);
   const GeometricSystem system(robot, std::move(embeddings), settings);
   GeometricSystem::Workspace workspace(system);
-  AccelerationFilter filter(robot);
+  MotionProgramSettings without_torque;
+  without_torque.by_torque = false;
+  MotionProgram filter(robot, without_torque);
   TorqueSolution solution(nv);
   const Eigen::VectorXd goal = 0.5 * (robot.limits().lower + robot.limits().upper);
   std::vector<benchmarks::State> states = benchmarks::states(robot, 100, 0);
@@ -67,8 +69,9 @@ int main(int argc, char** argv) {
     const benchmarks::State& state = states[static_cast<std::size_t>(k) % states.size()];
     failures += is_fallback(system.acceleration(state.q, state.v, goal, scene.obstacles, workspace));
     if (filtered) {
-      failures += filter.apply(state.q, state.v, workspace.acceleration, &workspace.clearances, solution) ==
-                  TorqueStatus::fallback_solver;
+      failures += filter.solve(
+                      {.q = state.q, .v = state.v, .acceleration = workspace.acceleration, .clearances = &workspace.clearances},
+                      solution) == TorqueStatus::fallback_solver;
     }
   }
   return failures == 0 ? 0 : 1;

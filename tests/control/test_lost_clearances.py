@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep.control import AccelerationFilter, Clearances, TorqueController, TorqueStatus
+from sidestep.control import Clearances, MotionProgram, TorqueStatus
 
 PERIOD = 0.001
 FOLDED = {  # of a UR10, two links 15 cm inside each other
@@ -87,8 +87,8 @@ def test_a_clearance_that_no_joint_changes_is_told() -> None:
     lost = Clearances(values=[-1.0], rates=[0.0], curvatures=[0.0], gradients=np.zeros((1, 3)), nearest=[4])
     zero = np.zeros(3)
     for solution in (
-        AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost),
-        TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=lost),
+        MotionProgram(robot, by_torque=False).solve(zero, zero, zero, clearances=lost),
+        MotionProgram(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=lost),
     ):
         assert solution.status == TorqueStatus.clearance_lost
         assert (solution.least_clearance, solution.least_coordinate, solution.least_nearest) == (-1.0, 0, 4)
@@ -108,8 +108,8 @@ def test_a_way_out_comes_before_the_margins_of_others() -> None:
     # Unless it is about to be lost in its turn, or is seen: then its margin covers errors.
     for other, margin, sign in ((0.0014, 0.025, 1.0), (0.0002, 0.025, -1.0), (0.0014, np.inf, -1.0)):
         clearances = lost(0.0023, other, margin)
-        filtered = AccelerationFilter(robot).apply(zero, zero, zero, clearances=clearances)
-        solved = TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=clearances)
+        filtered = MotionProgram(robot, by_torque=False).solve(zero, zero, zero, clearances=clearances)
+        solved = MotionProgram(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=clearances)
         assert filtered.status == solved.status == TorqueStatus.clearance_lost
         assert sign * filtered.acceleration[0] > 1.0
         assert sign * solved.acceleration[0] > 1.0

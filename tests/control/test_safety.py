@@ -7,7 +7,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
-from sidestep.control import AccelerationFilter, Clearances, SafetySettings, TorqueController, TorqueStatus
+from sidestep.control import Clearances, MotionProgram, SafetySettings, TorqueStatus
 from sidestep.system import GeometricSystem
 
 MARGIN = SafetySettings().margin
@@ -54,8 +54,8 @@ def scene(name: str, seed: int, speed: float = 0.0) -> Scene:
 def drive(s: Scene, *, torque: bool, delay: int = 0, steps: int = 2000) -> tuple[float, dict[str, int]]:
     """The smallest clearance under a stiff spring to the goal, and how often each status occurred."""
     controller, filter_ = (
-        TorqueController(s.robot, period=PERIOD),
-        AccelerationFilter(s.robot, period=PERIOD),
+        MotionProgram(s.robot, period=PERIOD),
+        MotionProgram(s.robot, period=PERIOD, by_torque=False),
     )
     q, v, obstacles = s.start, 0.0 * s.start, s.obstacles
     lowest, counts, pending = np.inf, {}, []
@@ -70,7 +70,7 @@ def drive(s: Scene, *, torque: bool, delay: int = 0, steps: int = 2000) -> tuple
             applied = pending.pop(0) if len(pending) > delay else solution.torque
             acceleration = np.linalg.solve(mass, applied - bias)
         else:
-            solution = filter_.apply(q, v, wanted, clearances=clearances)
+            solution = filter_.solve(q, v, wanted, clearances=clearances)
             acceleration = solution.acceleration
         counts[str(solution.status)] = counts.get(str(solution.status), 0) + 1
         v = v + PERIOD * acceleration
@@ -116,13 +116,13 @@ def test_without_the_rows_the_ball_is_hit() -> None:
     s = scene("fr3", 1)
     blind = Scene(s.robot, s.system, s.start, s.goal, ss.Obstacles([[50.0, 0.0, 0.0]]))
     q, v = s.start, 0.0 * s.start
-    filter_ = AccelerationFilter(s.robot, period=PERIOD)
+    filter_ = MotionProgram(s.robot, period=PERIOD, by_torque=False)
     lowest = np.inf
     for _ in range(2000):
         lowest = min(lowest, float(np.min(s.clearances_at(q, v, s.obstacles).values)))
         wanted = 100.0 * (s.goal - q) - 20.0 * v
         clearances = blind.clearances_at(q, v, blind.obstacles)
-        v = v + PERIOD * filter_.apply(q, v, wanted, clearances=clearances).acceleration
+        v = v + PERIOD * filter_.solve(q, v, wanted, clearances=clearances).acceleration
         q = q + PERIOD * v
     assert lowest < 0.0
 
@@ -130,14 +130,14 @@ def test_without_the_rows_the_ball_is_hit() -> None:
 def test_the_program_that_was_solved_can_be_solved_elsewhere() -> None:
     """Of filter and controller: the rows in use, whose minimiser is the acceleration that they gave."""
     s = scene("fr3", 1)
-    filter_, controller = AccelerationFilter(s.robot), TorqueController(s.robot)
+    filter_, controller = MotionProgram(s.robot, by_torque=False), MotionProgram(s.robot)
     q, v, held = s.start, 0.0 * s.start, 0
     for _ in range(400):
         clearances = s.clearances_at(q, v, s.obstacles)
         wanted = 100.0 * (s.goal - q) - 20.0 * v
         mass, bias = s.robot.mass_matrix(q), s.robot.bias(q, v)
         by_torque = controller.solve(q, v, wanted, mass, bias, clearances=clearances)
-        filtered = filter_.apply(q, v, wanted, clearances=clearances)
+        filtered = filter_.solve(q, v, wanted, clearances=clearances)
         for solution, program in ((by_torque, controller.program), (filtered, filter_.program)):
             assert np.all(np.isfinite(program.row_lower) | np.isfinite(program.row_upper))
             found = ss.control.QuadraticProgram(len(program.g), len(program.row_lower)).solve(
@@ -161,7 +161,9 @@ def test_what_is_reported() -> None:
         gradients=[[0, 0], [0.3, 0.1]],
         nearest=[-1, 7],
     )
-    solution = AccelerationFilter(robot).apply([0, 0], [-0.18, -0.06], [-5.0, -5.0], clearances=clearances)
+    solution = MotionProgram(robot, by_torque=False).solve(
+        [0, 0], [-0.18, -0.06], [-5.0, -5.0], clearances=clearances
+    )
     assert solution.status == TorqueStatus.limited
     (row,) = solution.safety
     assert (row.coordinate, row.nearest, row.slack) == (1, 7, 0.0)
@@ -178,6 +180,6 @@ def test_bad_settings_and_arguments_raise() -> None:
     with pytest.raises(ValueError, match="safety: margin is -1"):
         SafetySettings(margin=-1.0)
     with pytest.raises(ValueError, match="period is 0"):
-        AccelerationFilter(robot, period=0.0)
+        MotionProgram(robot, period=0.0, by_torque=False)
     with pytest.raises(TypeError, match="clearances must be Clearances or a Step"):
-        AccelerationFilter(robot).apply([0, 0], [0, 0], [0, 0], clearances=np.zeros(3))
+        MotionProgram(robot, by_torque=False).solve([0, 0], [0, 0], [0, 0], clearances=np.zeros(3))

@@ -11,7 +11,7 @@ import pytest
 import sidestep as ss
 from sidestep import _core
 from sidestep.bench.methods import barrier_system
-from sidestep.control import TorqueController, TorqueStatus
+from sidestep.control import MotionProgram, TorqueStatus
 from sidestep.controller import BarrierSettings, OnlinePlannerSettings, controller_settings_fields
 from sidestep.distance import SelfCollision
 from sidestep.obstacles import obstacles_from_shapes, pose_at
@@ -410,7 +410,7 @@ def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:
 
 def test_without_its_further_parts_it_is_the_system_followed_by_the_program(planar: ss.Arm) -> None:
     robot, goal, seen = planar.robot, planar.neutral + 0.3, near_the_tip(planar)
-    system, program = barrier_system(robot, planar.body), TorqueController(robot)
+    system, program = barrier_system(robot, planar.body), MotionProgram(robot)
     bounded = 0
     for q, v in zip(*states(planar, 20), strict=True):
         controller = bare(planar, goal, seen)  # its reference begins at the state, without acceleration

@@ -8,7 +8,7 @@ from stand_ins import simulate
 
 from sidestep import Body, Robot, SceneObject, Simulation, evaluate
 from sidestep._core import Obstacles
-from sidestep.control import TorqueController
+from sidestep.control import MotionProgram
 from sidestep.simulation import run_kinematically
 from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
@@ -27,7 +27,7 @@ def test_free_workspace_as_in_the_thesis(fr3: tuple[Robot, CollisionDensity]) ->
     """Thesis 6.2.2: only joint 1 moves, exactly as the damped spring, and every limit holds."""
     robot, psi = fr3
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
-    run = simulate(Simulation(robot), system, TorqueController(robot), START, GOAL, 6.0, Obstacles.none())
+    run = simulate(Simulation(robot), system, MotionProgram(robot), START, GOAL, 6.0, Obstacles.none())
     result = evaluate(run)
     # roots -1/2 and -1: q - goal = -(pi/2)(2 exp(-t/2) - exp(-t));
     # semi-implicit Euler at 1 ms is off by about dt/2
@@ -48,7 +48,7 @@ def test_torque_control_follows_the_kinematic_motion(fr3: tuple[Robot, Collision
     objects = SceneObject.balls(obstacles, radius=0.03, motion="free")
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
     simulated = simulate(
-        Simulation(robot, objects), system, TorqueController(robot), START, GOAL, 2.0, obstacles, arrival=None
+        Simulation(robot, objects), system, MotionProgram(robot), START, GOAL, 2.0, obstacles, arrival=None
     )
     kinematic = run_kinematically(
         robot, SystemAdapter(system, GOAL, obstacles), START, GOAL, 2.0, objects=objects, arrival=None

@@ -194,7 +194,7 @@ def test_every_number_is_in_the_file_and_in_the_snippet(
         elif parameter.name == "combine":
             assert ("thesis.Sum(" in code) == (value == "sum")
         elif parameter.place == "controller":
-            kind = "ControllerSettings" if METHODS[name].controlled else "TorqueController"
+            kind = "ControllerSettings" if METHODS[name].controlled else "MotionProgram"
             assert given[kind][parameter.field] == value
         elif parameter.place in CLASSES:
             assert given[CLASSES[parameter.place]][parameter.field] == value

@@ -177,7 +177,7 @@ const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avo
   return led;
 }
 
-void GoalFollower::limit_speed(double speed_limit, double pace, const SpeedRows& frames) noexcept {
+void GoalFollower::limit_speed(double speed_limit, double pace, const FrameSpeeds& frames) noexcept {
   if (!planner_) {
     return;
   }

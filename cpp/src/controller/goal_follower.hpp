@@ -12,7 +12,7 @@
 #include "reference.hpp"
 #include "request_board.hpp"
 #include "sidestep/attractor/local_minimum_recovery.hpp"
-#include "sidestep/constraints/speed_rows.hpp"
+#include "sidestep/constraints/speed_constraint.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/planning/online_planner.hpp"
 
@@ -73,7 +73,7 @@ class GoalFollower : private GoalMemory {
   /// The reference stays where it is.
   const Goal& rest_at(const Eigen::VectorXd& q) noexcept;
   /// Slows the path so that no frame is faster than `speed_limit` [m/s], and no faster than `pace` in [0, 1].
-  void limit_speed(double speed_limit, double pace, const SpeedRows& frames) noexcept;
+  void limit_speed(double speed_limit, double pace, const FrameSpeeds& frames) noexcept;
   void limit_pace(double pace) noexcept {
     if (planner_) {
       planner_->limit_pace(pace);

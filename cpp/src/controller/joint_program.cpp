@@ -1,6 +1,27 @@
 #include "joint_program.hpp"
 
 namespace sidestep {
+namespace {
+
+MotionProgramSettings program_settings(const ControllerSettings& settings, bool torque) {
+  MotionProgramSettings program;
+  program.period = settings.period;
+  program.by_torque = torque;
+  program.safety = settings.safety;
+  program.limits_speed = settings.speed_limits.has_value();
+  program.position_margin = settings.position_margin;
+  program.stop_time = settings.stop_time;
+  if (torque) {
+    program.stop_damping = settings.stop_damping;
+    program.torque_weight.setConstant(settings.torque_weight);
+    program.slack_weight = settings.slack_weight;
+    program.velocity_overrun = settings.velocity_overrun;
+    program.acceleration_overrun = settings.acceleration_overrun;
+  }
+  return program;
+}
+
+}  // namespace
 
 Robot within_margins(const Robot& robot, const ControllerSettings& settings, double speed) {
   JointLimits limits = robot.limits();
@@ -13,37 +34,16 @@ Robot within_margins(const Robot& robot, const ControllerSettings& settings, dou
   return Robot(robot.name(), robot.joints(), robot.frames(), robot.coordinate_names(), std::move(limits));
 }
 
-JointProgram::JointProgram(const Robot& robot, const ControllerSettings& settings, bool torque, int max_speed_rows) {
-  if (!torque) {
-    acceleration_.emplace(robot, AccelerationFilterSettings{settings.period, settings.position_margin, settings.stop_time,
-                                                            settings.safety, max_speed_rows});
-    return;
-  }
-  TorqueControllerSettings program;
-  program.period = settings.period;
-  program.safety = settings.safety;
-  program.max_speed_rows = max_speed_rows;
-  program.position_margin = settings.position_margin;
-  program.stop_time = settings.stop_time;
-  program.stop_damping = settings.stop_damping;
-  program.torque_weight.setConstant(settings.torque_weight);
-  program.slack_weight = settings.slack_weight;
-  program.velocity_overrun = settings.velocity_overrun;
-  program.acceleration_overrun = settings.acceleration_overrun;
-  torque_.emplace(robot, program);
-}
+JointProgram::JointProgram(const Robot& robot, const ControllerSettings& settings, bool torque)
+    : program_(robot, program_settings(settings, torque)) {}
 
 TorqueStatus JointProgram::stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
                                 const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque,
                                 TorqueSolution& solution) noexcept {
-  if (!torque_) {
-    return acceleration_->apply(q, v, wanted, nullptr, solution);
-  }
-  const LastCommand last{nullptr, last_torque};
-  if (told.mass_matrix != nullptr && told.bias->size() == dynamics.bias().size() && told.bias->allFinite()) {
-    return torque_->solve(q, v, wanted, *told.mass_matrix, *told.bias, nullptr, {}, last, solution);
-  }
-  return torque_->solve(q, v, wanted, dynamics.mass(), dynamics.bias(), nullptr, {}, last, solution);
+  const LastCommand last{nullptr, program_.settings().by_torque ? last_torque : nullptr};
+  const bool usable = told.mass_matrix != nullptr && told.bias->size() == dynamics.bias().size() && told.bias->allFinite();
+  return usable ? program_.solve({q, v, wanted, *told.mass_matrix, *told.bias, nullptr, {}, last}, solution)
+                : program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), nullptr, {}, last}, solution);
 }
 
 LastCommand near_last(const Eigen::VectorXd& acceleration, const Eigen::VectorXd* torque, const ArmDynamics& dynamics,

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <optional>
-
 #include "arm_dynamics.hpp"
-#include "sidestep/constraints/acceleration_filter.hpp"
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "sidestep/controller/settings.hpp"
 
 namespace sidestep {
@@ -15,26 +12,24 @@ Robot within_margins(const Robot& robot, const ControllerSettings& settings, dou
 /// The quadratic program for torque, or for acceleration where the arm is not moved by torque.
 class JointProgram {
  public:
-  JointProgram(const Robot& within_margins, const ControllerSettings& settings, bool torque, int max_speed_rows);
+  JointProgram(const Robot& within_margins, const ControllerSettings& settings, bool torque);
 
   /// The acceleration nearest to the wanted one at q, v, with the dynamics there.
   [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted,
                                    const ArmDynamics& dynamics, const Clearances* clearances, const SecondState& second,
                                    const LastCommand& last, TorqueSolution& solution,
-                                   const SpeedRows* speed = nullptr) noexcept {
-    return torque_ ? torque_->solve(q, v, wanted, dynamics.mass(), dynamics.bias(), clearances, second, last, solution, speed)
-                   : acceleration_->apply(q, v, wanted, clearances, second, last, solution, speed);
+                                   const SpeedLimitNow& speed = {}) noexcept {
+    return program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), clearances, second, last, speed}, solution);
   }
   /// A damped stop of an arm whose state may be unusable, with the dynamics told where they are.
   [[nodiscard]] TorqueStatus stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
                                   const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque,
                                   TorqueSolution& solution) noexcept;
   /// Share of the jerk limits with which torques keep their rate.
-  double jerk_share() const noexcept { return torque_ ? torque_->jerk_share() : 1.0; }
+  double jerk_share() const noexcept { return program_.settings().by_torque ? program_.jerk_share() : 1.0; }
 
  private:
-  std::optional<TorqueController> torque_;
-  std::optional<AccelerationFilter> acceleration_;
+  MotionProgram program_;
 };
 
 /// What the program is to stay near: the last acceleration, and the last torque where there was one. `factor`: up to which the

@@ -16,12 +16,11 @@ constexpr double foresight = 0.1;
 }  // namespace
 
 SpeedLimiter::SpeedLimiter(const ClearanceQuery& body, const ControllerSettings& settings)
-    : body_(body), workspace_(body), settings_(settings), rows_(body.robot()), arm_rows_(rows_) {}
+    : body_(body), workspace_(body), settings_(settings), frames_(body.robot()) {}
 
-std::optional<double> SpeedLimiter::update(const KinematicState& reference, const KinematicState& arm, bool apart,
-                                           const Eigen::VectorXd& q, const Obstacles& obstacles, bool known_before,
-                                           Command& command) noexcept {
-  command.speed = arm_rows_.fastest(arm).speed;
+std::optional<double> SpeedLimiter::update(const KinematicState& reference, const KinematicState& arm, const Eigen::VectorXd& q,
+                                           const Obstacles& obstacles, bool known_before, Command& command) noexcept {
+  command.speed = frames_.fastest(arm).speed;
   if (!settings_.speed_limits) {
     command.speed_limit = infinity;
     return std::nullopt;
@@ -35,10 +34,9 @@ std::optional<double> SpeedLimiter::update(const KinematicState& reference, cons
   command.distance = now < far ? now : infinity;
   command.speed_limit = limits.allowed(now);
   const double next = limits.allowed(now - closing);
-  rows_.update(reference, body_.robot().limits(), command.speed_limit, next, period);
-  if (apart) {
-    arm_rows_.update(arm, body_.robot().limits(), command.speed_limit, next, period);
-  }
+  const Eigen::VectorXd& most = body_.robot().limits().acceleration;
+  at_reference_ = {&reference, &most, command.speed_limit, next};
+  at_arm_ = {&arm, &most, command.speed_limit, next};
   return limits.allowed(now - closing / period * foresight);
 }
 

@@ -223,7 +223,7 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     dynamics_.update_gravity(at_arm, !measured_.was_known());
   }
   const std::optional<double> path_speed =
-      speed_.update(at_reference, at_arm, apart, measured_.position(), sources_.obstacles(), measured_.was_known(), command_);
+      speed_.update(at_reference, at_arm, measured_.position(), sources_.obstacles(), measured_.was_known(), command_);
   if (path_speed && &followed == inputs_.goal().led_goal()) {
     inputs_.goal().limit_speed(*path_speed, look_ahead_.current_pace(), speed_.frames());
   }
@@ -235,7 +235,7 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     dynamics_.update(at_reference, !apart || !dynamics_.has_model() ? told : ToldDynamics{});
   }
   const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.corrected(closing),
-                                             second, last, solution_, speed_.rows());
+                                             second, last, solution_, speed_.at_reference());
   if (model.torque) {
     reference_.torque = solution_.torque;
   }
@@ -274,7 +274,7 @@ TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tra
   }
   return tracker_.track(reference_,
                         {measured_.position(), measured_.velocity(), attractor_.corrected_of_arm(sources_.closing()), dynamics_,
-                         last_, speed_.rows_of_arm()},
+                         last_, speed_.at_arm()},
                         tracking_error, solved);
 }
 

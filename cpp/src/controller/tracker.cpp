@@ -24,15 +24,14 @@ constexpr double most_per_period = 0.2;  // feedback's frequency × period, at m
 
 }  // namespace
 
-Tracker::Tracker(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool torque,
-                 int max_speed_rows)
+Tracker::Tracker(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool torque)
     : limits_(robot.limits()),
       joints_(joints),
       settings_(settings),
       torque_(torque),
       drives_track_(sidestep::drives_track(settings)),
       frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
-      program_(within_margins(robot, settings, 1.0), settings, torque, max_speed_rows),
+      program_(within_margins(robot, settings, 1.0), settings, torque),
       solution_(robot.num_coordinates(), settings.safety.max_rows),
       feedback_(Eigen::VectorXd::Zero(robot.num_coordinates())),
       drift_(feedback_),

@@ -24,7 +24,7 @@ inline bool drives_track(const ControllerSettings& settings) noexcept {
 class Tracker {
  public:
   /// Throws std::invalid_argument where the settings ask for an impedance that the arm cannot have.
-  Tracker(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool torque, int max_speed_rows);
+  Tracker(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool torque);
 
   /// Writes the acceleration by which the reference gives way to an arm that cannot follow it (nv).
   void write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q, Eigen::VectorXd& coupling) const noexcept;
@@ -36,7 +36,7 @@ class Tracker {
     const Clearances& clearances;
     const ArmDynamics& dynamics;  // there
     const LastOutput& last;
-    const SpeedRows* speed;  // null: no limits
+    const SpeedLimitNow& speed;
   };
   /// Writes the solution that tracks the reference; `tracking_error` [rad | m]: the largest of a joint. `decided`: what the program
   /// of the reference ended with. Returns that, or what is worse.

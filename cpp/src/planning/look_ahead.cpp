@@ -45,19 +45,11 @@ int whole_periods(double duration, double period) noexcept {
   return std::max(1, static_cast<int>(std::lround(duration / period)));
 }
 
-/// Settings of an AccelerationFilter or a TorqueController.
-template <class Settings>
-Settings with_period(double period) {
-  Settings settings;
+MotionProgramSettings program_settings(double period, bool by_torque) {
+  MotionProgramSettings settings;
   settings.period = period;
+  settings.by_torque = by_torque;
   return settings;
-}
-
-std::variant<AccelerationFilter, TorqueController> limiter_for(const Robot& robot, double period, bool by_torque) {
-  if (by_torque) {
-    return TorqueController(robot, with_period<TorqueControllerSettings>(period));
-  }
-  return AccelerationFilter(robot, with_period<AccelerationFilterSettings>(period));
 }
 
 }  // namespace
@@ -90,7 +82,7 @@ double LookAheadSettings::pace(double age) const noexcept {
 }
 
 LookAhead::Stepper::Stepper(const Robot& robot, double period, bool by_torque)
-    : period(period), limiter(limiter_for(robot, period, by_torque)) {}
+    : period(period), program(robot, program_settings(period, by_torque)) {}
 
 LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings,
                      std::optional<RigidBodyDynamics> dynamics)
@@ -221,14 +213,11 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
   ++stepper.steps;
   const double clearance = sees ? obstacle_clearance(workspace_.clearances) : -infinity;
   const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
-  if (auto* program = std::get_if<TorqueController>(&stepper.limiter)) {
+  if (stepper.program.settings().by_torque) {
     dynamics_->mass_matrix(motion.q, *dynamics_workspace_, mass_);
     dynamics_->bias(motion.q, motion.v, *dynamics_workspace_, bias_);
-    static_cast<void>(program->solve(motion.q, motion.v, wanted, mass_, bias_, clearances, filtered_));
-  } else {
-    auto& filter = std::get<AccelerationFilter>(stepper.limiter);
-    static_cast<void>(filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
   }
+  static_cast<void>(stepper.program.solve({motion.q, motion.v, wanted, mass_, bias_, clearances}, filtered_));
   motion.v += period * filtered_.acceleration;
   motion.q += period * motion.v;
   motion.obstacles.advance(period);

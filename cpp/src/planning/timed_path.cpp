@@ -23,7 +23,7 @@ constexpr double free_velocity = 2.0, free_acceleration = 10.0;
 constexpr double stopping =
     1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
 
-/// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this distance left may close.
+/// p⁻¹ of ClearanceConstraints: the speed [m/s] at which a clearance with this distance left may close.
 double closing_speed(double distance_left, double A, double rate) {
   return distance_left <= A / (rate * rate) ? rate * distance_left
                                             : std::sqrt(std::max(0.0, 2.0 * A * distance_left - A * A / (rate * rate)));

@@ -5,10 +5,12 @@
 #include <limits>
 #include <tuple>
 
-#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
+#include "support/without_torque.hpp"
 
 using namespace sidestep;
 using test::nv;
@@ -67,9 +69,9 @@ FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::Ve
                                Eigen::VectorXd a, int steps) {
   JointLimits limits = test::arm_limits(nv);
   limits.jerk.setConstant(1000.0);
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv);
-  const double T = filter.period();
+  const double T = filter.settings().period;
   const auto num = static_cast<int>(begin.size());
   const Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
   Eigen::VectorXd q = wanted, h = begin;
@@ -83,7 +85,8 @@ FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::Ve
     clearances.margins.setConstant(margin);
     clearances.mind_nearest();
     found.least = std::min(found.least, h.minCoeff());
-    static_cast<void>(filter.apply(q, v, wanted, &clearances, {}, LastCommand{&a}, solution));
+    static_cast<void>(
+        filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances, .last = {&a}}, solution));
     found.jerk = std::max(found.jerk, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
     a = solution.acceleration;
     q += T * v + 0.5 * T * T * a;
@@ -99,8 +102,8 @@ FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::Ve
 BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
   Random random(11);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv), filtered(nv);
   const double T = controller.settings().period, rounding = 1.0 + 1e-6;
   const double fastest = controller.settings().velocity_overrun * 2.5 * rounding;
@@ -114,11 +117,12 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
     }
     const Eigen::VectorXd a = random.magnitude(0.1, 100.0) * random.vector(nv);
     const Eigen::MatrixXd M = test::random_mass(random, nv);
-    BOOST_REQUIRE_EQUAL(test::allocations_of([&] {
-                          static_cast<void>(controller.solve(q, v, a, M, h, &clearances, solution));
-                          static_cast<void>(filter.apply(q, v, a, &clearances, filtered));
-                        }),
-                        0u);
+    BOOST_REQUIRE_EQUAL(
+        test::allocations_of([&] {
+          static_cast<void>(controller.solve({q, v, a, M, h, &clearances}, solution));
+          static_cast<void>(filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, filtered));
+        }),
+        0u);
     const double least = least_of(clearances);
     for (const TorqueSolution* s : {&solution, &filtered}) {
       BOOST_REQUIRE(s->status <= TorqueStatus::clearance_lost);
@@ -138,7 +142,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
   // Too fast, outside position limits, gravity that is too heavy, in any combination.
   Random random(12);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 3000; ++trial) {
     const Clearances clearances = hopeless(random);
@@ -149,7 +153,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
       h[i] = random.uniform(-1.5, 1.5) * limits.effort[i];
     }
     const Eigen::MatrixXd M = test::random_mass(random, nv);
-    static_cast<void>(controller.solve(q, v, random.vector(nv), M, h, &clearances, solution));
+    static_cast<void>(controller.solve({q, v, random.vector(nv), M, h, &clearances}, solution));
     BOOST_REQUIRE(solution.status <= TorqueStatus::clearance_lost);
     BOOST_REQUIRE((solution.torque.array().abs() <= limits.effort.array()).all());
     BOOST_REQUIRE(solution.acceleration.allFinite());
@@ -158,8 +162,8 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
 
 BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the_middle) {
   const Robot arm = test::serial_arm(test::arm_limits(nv));
-  AccelerationFilter filter(arm);
-  TorqueController controller(arm);
+  MotionProgram filter(arm, test::without_torque());
+  MotionProgram controller(arm);
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   for (const bool torque : {false, true}) {
@@ -171,8 +175,9 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the
     for (int step = 0; step < 4000; ++step) {
       const Clearances clearances = pressed(q[0], v[0], 0.1);
       const Eigen::VectorXd wanted = Eigen::VectorXd::Constant(nv, 1.0) - 20.0 * v;
-      const TorqueStatus status = torque ? controller.solve(q, v, wanted, M, zero, &clearances, solution)
-                                         : filter.apply(q, v, wanted, &clearances, solution);
+      const TorqueStatus status =
+          torque ? controller.solve({q, v, wanted, M, zero, &clearances}, solution)
+                 : filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances}, solution);
       BOOST_REQUIRE(status == TorqueStatus::clearance_lost);
       v += 0.001 * solution.acceleration;
       q += 0.001 * v;
@@ -188,8 +193,8 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the
 }
 
 BOOST_AUTO_TEST_CASE(a_clearance_that_no_joint_changes_is_told) {
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
-  AccelerationFilter filter(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram filter(test::serial_arm(test::arm_limits(nv)), test::without_torque());
   TorqueSolution solution(nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
@@ -201,20 +206,21 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_no_joint_changes_is_told) {
     clearances.values[0] = clearances.least[0] = clearance;
     clearances.rates[0] = rate;
     clearances.mind_nearest();
-    BOOST_TEST((controller.solve(zero, zero, zero, M, zero, &clearances, solution) == status));
-    BOOST_TEST((filter.apply(zero, zero, zero, &clearances, solution) == status));
+    BOOST_TEST((controller.solve({zero, zero, zero, M, zero, &clearances}, solution) == status));
+    BOOST_TEST((filter.solve({.q = zero, .v = zero, .acceleration = zero, .clearances = &clearances}, solution) == status));
     BOOST_TEST(solution.least_clearance == clearance);
     BOOST_TEST(solution.least_coordinate == 0);
     BOOST_TEST(solution.least_nearest == 7);
   }
   clearances.nearest[0] = -1;
-  BOOST_TEST((filter.apply(zero, zero, zero, &clearances, solution) == TorqueStatus::ok));
+  BOOST_TEST(
+      (filter.solve({.q = zero, .v = zero, .acceleration = zero, .clearances = &clearances}, solution) == TorqueStatus::ok));
   BOOST_TEST(solution.least_coordinate == -1);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   // The mean is above zero and fast on its way out: the program has nothing to do, but an ellipsoid is still inside.
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   Clearances clearances(nv, 1);
@@ -225,7 +231,7 @@ BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   clearances.mind_nearest();
   clearances.least[0] = -0.001;
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
-  BOOST_TEST((controller.solve(zero, zero, zero, M, zero, &clearances, solution) == TorqueStatus::clearance_lost));
+  BOOST_TEST((controller.solve({zero, zero, zero, M, zero, &clearances}, solution) == TorqueStatus::clearance_lost));
   BOOST_TEST(solution.least_clearance == -0.001);
 }
 

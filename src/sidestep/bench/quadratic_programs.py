@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 import sidestep
 from sidestep._core import (
-    AccelerationFilter,
     Controller,
     ControllerSettings,
+    MotionProgram,
     Obstacles,
     QuadraticProgram,
     QuadraticProgramData,
@@ -70,7 +70,7 @@ def run_quadratic_programs(
 ) -> dict[str, Any]:
     """Takes programs from motions, lets every solver solve each of them, and returns a document for JSON.
 
-    The programs are those of `AccelerationFilter` while the arm moves between random places above a table. All solvers
+    The programs are those of `MotionProgram` while the arm moves between random places above a table. All solvers
     start anew at each: from what the last one left to the solution of the next is not measured. Times are what the
     solvers measure themselves, in compiled code, the setting up of their data included. Where a solver's result is not
     the core's within 1e-5 it counts as wrong, not as quick.
@@ -143,7 +143,7 @@ def _measure(
 def _programs(settings: QuadraticProgramSettings) -> list[QuadraticProgramData]:
     """Of every tenth state; at least one is held by a clearance or a limit."""
     robot, controller, obstacles, rng = _scene(settings)
-    system, filter = controller.system, AccelerationFilter(robot)
+    system, filter = controller.system, MotionProgram(robot, by_torque=False)
     programs: list[QuadraticProgramData] = []
     q = clear_place(robot, system, obstacles, rng)
     constrained = False
@@ -153,7 +153,7 @@ def _programs(settings: QuadraticProgramSettings) -> list[QuadraticProgramData]:
         moved = integrate(controller, q, np.zeros_like(q), steps=MOTION)
         for k in range(0, MOTION, EVERY):
             step = system.acceleration(moved.q[k], moved.v[k], goal, obstacles)
-            filter.apply(moved.q[k], moved.v[k], step.acceleration, clearances=step)
+            filter.solve(moved.q[k], moved.v[k], step.acceleration, clearances=step)
             programs.append(filter.program)
             constrained = constrained or _core(programs[-1])[2] > 0
         q = np.clip(moved.last_q, robot.limits.lower, robot.limits.upper)

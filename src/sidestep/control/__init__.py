@@ -1,16 +1,18 @@
-"""Torque control within the limits of an arm (the control folder of the core)."""
+"""Motion within the limits of an arm and its clearances (the constraints folder of the core)."""
+
+from typing import Any
 
 from sidestep._core import (
-    AccelerationFilter,
     Clearances,
     Limit,
+    MotionProgram,
     QuadraticProgram,
     QuadraticProgramData,
     QuadraticProgramStatus,
     QuadraticSolution,
+    Robot,
     SafetyRow,
     SafetySettings,
-    TorqueController,
     TorqueFault,
     TorqueSolution,
     TorqueStatus,
@@ -21,6 +23,7 @@ __all__ = [
     "AccelerationFilter",
     "Clearances",
     "Limit",
+    "MotionProgram",
     "QuadraticProgram",
     "QuadraticProgramData",
     "QuadraticProgramStatus",
@@ -33,3 +36,15 @@ __all__ = [
     "TorqueStatus",
     "acceleration_bounds",
 ]
+
+TorqueController = MotionProgram
+"""The name of `MotionProgram` in 0.2."""
+
+
+class AccelerationFilter(MotionProgram):
+    """`MotionProgram` of an arm that is not moved by torque, as in 0.2: the same with `by_torque=False`."""
+
+    def __init__(self, robot: Robot, **settings: Any) -> None:
+        super().__init__(robot, by_torque=False, **settings)
+
+    apply = MotionProgram.solve

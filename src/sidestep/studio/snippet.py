@@ -20,7 +20,7 @@ WIDTH = 80  # [characters] that a window on the page shows
 
 # Where the classes are that a snippet needs beside those of `sidestep` itself.
 _ROOMS = {
-    "sidestep.control": ("SafetySettings", "TorqueController"),
+    "sidestep.control": ("SafetySettings", "MotionProgram"),
     "sidestep.controller": (
         "ArrivalSettings",
         "BarrierSettings",
@@ -55,7 +55,7 @@ def _spelled(name: str) -> str:
 def python_snippet(snapshot: Snapshot) -> str:
     """Python that makes the `controller` that moves the arm, and takes a step without obstacles.
 
-    By one of the thesis's methods it is a `TorqueController`, which tracks the acceleration of a `system`.
+    By one of the thesis's methods it is a `MotionProgram`, which tracks the acceleration of a `system`.
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)

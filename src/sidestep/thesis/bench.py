@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sidestep._core import GeometricSystem, TorqueController, rollout
+from sidestep._core import GeometricSystem, MotionProgram, rollout
 from sidestep.bench.motion import CHUNK, Columns, Motion, MotionSettings, under_torque
 from sidestep.bench.problem import Problem
 from sidestep.body import Body
@@ -27,7 +27,7 @@ class SystemRunner:
         if settings.poses:
             raise ValueError("pose goals are for the methods 'controller' and 'barrier'; the thesis has none")
         if settings.torque:
-            program = TorqueController(self.robot, period=settings.period)
+            program = MotionProgram(self.robot, period=settings.period)
             return under_torque(
                 self.robot,
                 SystemAdapter(self.system, problem.goal, problem.obstacles_at, program),

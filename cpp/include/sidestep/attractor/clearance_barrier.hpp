@@ -22,7 +22,7 @@ namespace sidestep {
 class ClearanceBarrier : public Barrier {
  public:
   /// Clearances are measured up to `reach` [m], at least to the activation distance, and what approaches as far as the arm
-  /// needs to stop, for what keeps them (TorqueController, AccelerationFilter). Throws std::invalid_argument that names the
+  /// needs to stop, for what keeps them (MotionProgram). Throws std::invalid_argument that names the
   /// setting at fault.
   ClearanceBarrier(const Robot& robot, std::shared_ptr<const ClearanceGroup> group, const BarrierFunction& function,
                    double reach = 0.0, const char* owner = "clearance barrier");

@@ -16,7 +16,7 @@ struct ClearanceStateView {
 /// Where an embedding that is a barrier of clearances writes them.
 struct ClearanceView : ClearanceStateView {
   Eigen::Map<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
-  Eigen::Map<Eigen::VectorXd> margins;  ///< (m) SafetyRows keep no larger margins than these [m]
+  Eigen::Map<Eigen::VectorXd> margins;  ///< (m) ClearanceConstraints keep no larger margins than these [m]
   ClearanceStateView approach;          ///< of the critical sample, see stopping_clearance.hpp
   Eigen::Map<Eigen::VectorXd> least;    ///< (m) the smallest of those that h is the mean of [m]; +inf: beyond the reach
 };

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sidestep/constraints/acceleration_bounds.hpp"
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_solution.hpp"
 #include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "sidestep/constraints/safety_rows.hpp"
-#include "sidestep/constraints/speed_rows.hpp"
+#include "sidestep/constraints/safety_settings.hpp"
+#include "sidestep/constraints/speed_constraint.hpp"
 #include "sidestep/attractor/local_minimum_recovery.hpp"
 #include "sidestep/planning/look_ahead.hpp"
 #include "sidestep/math/fields.hpp"
@@ -73,7 +73,7 @@ struct ControllerSettings {
   double effort_margin = 0.05;   ///< share of the effort limits that is left for what the model lacks
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]
-  /// of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
+  /// of a stop without a mass matrix, see MotionProgramSettings; so are the next four
   double stop_damping = 0.25;
   double torque_weight = 1e-6, slack_weight = 1e3;
   double velocity_overrun = 1.2, acceleration_overrun = 10.0;

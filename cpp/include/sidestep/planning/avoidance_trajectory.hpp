@@ -15,7 +15,7 @@ namespace sidestep {
 /// V nine tenths of the joint's acceleration limit (90 /s² where there is none) and velocity limit: what is left serves
 /// to follow it. It is followed with a* + ω² (q* − q) + 2ω (v* − v), q*, v*, a* the reference, ω = 10 /s.
 ///
-/// Obstacles are ignored here: the acceleration is for an AccelerationFilter or a TorqueController with clearances.
+/// Obstacles are ignored here: the acceleration is for a MotionProgram with clearances.
 class AvoidanceTrajectory {
  public:
   /// From q at velocity v (nv) to rest at `target` (nv).

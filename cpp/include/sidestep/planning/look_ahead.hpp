@@ -9,8 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "sidestep/constraints/acceleration_filter.hpp"
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "sidestep/math/fields.hpp"
 #include "sidestep/math/interruption.hpp"
 #include "sidestep/planning/avoidance_trajectory.hpp"
@@ -45,8 +44,8 @@ const std::vector<Field<LookAheadSettings>>& fields();
 /// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
 /// limit stops the arm, where a step aside would have let it pass.
 ///
-/// In a look the system, with clearances and limits as an AccelerationFilter keeps them or, where the dynamics are
-/// given, a TorqueController, is integrated from where the arm will be when the look has ended, with the obstacles
+/// In a look the system, with clearances and limits as a MotionProgram keeps them (by torque where the dynamics are
+/// given), is integrated from where the arm will be when the look has ended, with the obstacles
 /// moving on as they do. If on its way to the goal that comes nearer to an obstacle than `clearance`, and so does the
 /// trajectory that is followed already, trajectories to random configurations are drawn: near ones, far ones and such
 /// as are near that of the trajectory followed. They are filtered in three stages. Those come first whose references,
@@ -117,8 +116,8 @@ class LookAhead {
   /// What integrates motions by a period [s].
   struct Stepper {
     double period;
-    std::variant<AccelerationFilter, TorqueController> limiter;  // the latter where the dynamics are given
-    int steps = 0;                                               // integrated so far
+    MotionProgram program;  // by torque where the dynamics are given
+    int steps = 0;          // integrated so far
 
     Stepper(const Robot& robot, double period, bool by_torque);
   };

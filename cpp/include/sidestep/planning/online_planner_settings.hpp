@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "sidestep/constraints/safety_rows.hpp"
+#include "sidestep/constraints/safety_settings.hpp"
 #include "sidestep/math/fields.hpp"
 #include "sidestep/planning/rrt_connect.hpp"
 #include "sidestep/planning/timed_path.hpp"

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/constraints/safety_rows.hpp"
+#include "sidestep/constraints/safety_settings.hpp"
 #include "sidestep/math/fields.hpp"
 #include "sidestep/robot/dynamics.hpp"
 #include "sidestep/clearance/clearance_query.hpp"
@@ -41,7 +41,7 @@ struct TimedPath {
 
 /// Times a path, as fast as the limits allow, from a velocity v (nv) of which what leads along the path counts.
 ///
-/// Near obstacles the rule of SafetyRows bounds the speed: with h_i the clearance of an item, whose distance left is s = h_i − margin (at least
+/// Near obstacles the rule of ClearanceConstraints bounds the speed: with h_i the clearance of an item, whose distance left is s = h_i − margin (at least
 /// 1 mm; where the path itself comes nearer than the margin, that), and A = braking_fraction |dh_i/ds| (d²s/dt²)_max, the speed
 /// along the path is at most p⁻¹(s) / |dh_i/ds| where h_i shrinks. A path that is not `measured` is slow everywhere, and
 /// soon made: clearances are looked at nowhere.

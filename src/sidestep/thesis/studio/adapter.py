@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, Obstacles, Step, TorqueController, TorqueSolution
+from sidestep._core import GeometricSystem, MotionProgram, Obstacles, Step, TorqueSolution
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
@@ -27,7 +27,7 @@ class SystemAdapter:
         robot: the arm. tip: the frame whose pose is a goal.
     """
 
-    def __init__(self, robot: Robot, system: GeometricSystem, program: TorqueController, tip: str) -> None:
+    def __init__(self, robot: Robot, system: GeometricSystem, program: MotionProgram, tip: str) -> None:
         self.system = system
         self._robot, self._program, self._tip = robot, program, tip
         self._step: Step | None = None

@@ -22,7 +22,7 @@ def custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:
         f"robot = {robot_code(written.robot, written)}",
         *_system_code(written),
         *call("safety = SafetySettings", safety),
-        *call("controller = TorqueController", torque, "robot", period, "safety=safety"),
+        *call("controller = MotionProgram", torque, "robot", period, "safety=safety"),
         *_goal_code(snapshot),
         "",
         "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",

@@ -1,10 +1,10 @@
-"""The torque controller on the models of real arms. The C++ tests cover every path and status."""
+"""The motion program on the models of real arms. The C++ tests cover every path and status."""
 
 import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep.control import Limit, TorqueController, TorqueStatus
+from sidestep.control import AccelerationFilter, Limit, MotionProgram, TorqueController, TorqueStatus
 
 ROBOTS = ["fr3", "panda", "ur5", "planar2"]
 
@@ -15,7 +15,7 @@ def robot(request):
 
 
 def test_holds_the_arm_against_gravity(robot):
-    controller = TorqueController(robot)
+    controller = MotionProgram(robot)
     rng = np.random.default_rng(0)
     zero = np.zeros(robot.num_coordinates)
     for _ in range(20):
@@ -32,7 +32,7 @@ def test_holds_the_arm_against_gravity(robot):
 
 def test_wild_demands_never_break_a_limit(robot):
     limits = robot.limits
-    controller = TorqueController(robot)
+    controller = MotionProgram(robot)
     rng = np.random.default_rng(1)
     q, v = robot.neutral.copy(), np.zeros(robot.num_coordinates)
     for k in range(2000):
@@ -63,7 +63,7 @@ def test_limits_in_the_way_are_named():
         (20.0, Limit.torque_upper),
         (1e6, Limit.torque_upper | Limit.acceleration_lower),
     ]:
-        solution = TorqueController(robot).solve(q, v, [demand, 0.0], mass, bias)
+        solution = MotionProgram(robot).solve(q, v, [demand, 0.0], mass, bias)
         assert solution.status == TorqueStatus.limited
         assert str(solution.status) == "limited"
         assert solution.active == (Limit(0), expected)
@@ -76,7 +76,7 @@ def test_limits_in_the_way_are_named():
 @pytest.mark.parametrize("argument", ["position", "velocity", "acceleration", "mass_matrix", "bias"])
 def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
     robot = ss.Robot.named("fr3")
-    controller = TorqueController(robot)
+    controller = MotionProgram(robot)
     v = np.full(robot.num_coordinates, 0.1)
     inputs = {
         "position": robot.neutral.copy(),
@@ -108,10 +108,31 @@ def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
 def test_bad_settings_and_shapes_raise():
     robot = ss.Robot.named("planar2")
     with pytest.raises(ValueError, match="period is 0"):
-        TorqueController(robot, period=0.0)
+        MotionProgram(robot, period=0.0)
     with pytest.raises(ValueError, match="tracking_weight"):
-        TorqueController(robot, tracking_weight=-1.0)
+        MotionProgram(robot, tracking_weight=-1.0)
     with pytest.raises(ValueError, match="position_margin is 100"):
-        TorqueController(robot, position_margin=100.0)
+        MotionProgram(robot, position_margin=100.0)
     with pytest.raises(ValueError, match=r"mass_matrix has shape \(3, 3\), expected \(2, 2\)"):
-        TorqueController(robot).solve([0, 0], [0, 0], [0, 0], np.eye(3), [0, 0])
+        MotionProgram(robot).solve([0, 0], [0, 0], [0, 0], np.eye(3), [0, 0])
+
+
+def test_the_names_of_0_2_give_the_same():
+    robot = ss.Robot.named("planar2")
+    bias, mass = np.zeros(2), np.eye(2)
+    program = MotionProgram(robot, by_torque=False, period=0.002)
+    old = AccelerationFilter(robot, period=0.002)
+    assert (old.period, old.num_coordinates) == (0.002, 2)
+    for wanted in ([1.0, -2.0], [1e3, 0.0]):
+        given = old.apply([0, 0], [0, 0], wanted)
+        np.testing.assert_array_equal(given.acceleration, program.solve([0, 0], [0, 0], wanted).acceleration)
+        solved = TorqueController(robot).solve([0, 0], [0, 0], wanted, mass, bias)
+        np.testing.assert_array_equal(
+            solved.torque, MotionProgram(robot).solve([0, 0], [0, 0], wanted, mass, bias).torque
+        )
+
+
+def test_an_arm_moved_by_torque_needs_its_dynamics():
+    robot = ss.Robot.named("planar2")
+    with pytest.raises(ValueError, match="mass_matrix and bias must be given"):
+        MotionProgram(robot).solve([0, 0], [0, 0], [0, 0])

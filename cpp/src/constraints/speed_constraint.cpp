@@ -1,4 +1,4 @@
-#include "sidestep/constraints/speed_rows.hpp"
+#include "sidestep/constraints/speed_constraint.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -50,24 +50,20 @@ void SpeedLimitSettings::validate() const {
   require(near_distance < far_distance, "speed_limits: near_distance", near_distance, "less than far_distance");
 }
 
-SpeedRows::SpeedRows(const Robot& robot) {
+FrameSpeeds::FrameSpeeds(const Robot& robot) {
   for (std::size_t f = 0; f < robot.frames().size(); ++f) {
     const Frame& frame = robot.frames()[f];
     const Eigen::Vector3d p = frame.X_JF.translation();
     const auto same = [&](const Place& place) { return place.joint == frame.joint && place.p == p; };
-    if (frame.joint >= 0 && std::none_of(frames_.begin(), frames_.end(), same)) {
-      frames_.push_back({static_cast<int>(f), frame.joint, p});
+    if (frame.joint >= 0 && std::none_of(places_.begin(), places_.end(), same)) {
+      places_.push_back({static_cast<int>(f), frame.joint, p});
     }
   }
-  normals.setZero(max_size(), robot.num_coordinates());
-  upper.setZero(max_size());
-  lengths.setZero(max_size());
-  frames.assign(frames_.size(), -1);
 }
 
-SpeedRows::Fastest SpeedRows::fastest(const KinematicState& state) const noexcept {
+FrameSpeeds::Fastest FrameSpeeds::fastest(const KinematicState& state) const noexcept {
   Fastest found;
-  for (const Place& place : frames_) {
+  for (const Place& place : places_) {
     const double speed = motion_of(state.link(place.joint), place.p).p_dot.norm();
     if (speed > found.speed) {
       found = {speed, place.frame};
@@ -76,13 +72,18 @@ SpeedRows::Fastest SpeedRows::fastest(const KinematicState& state) const noexcep
   return found;
 }
 
-void SpeedRows::update(const KinematicState& state, const JointLimits& limits, double limit, double next_limit,
-                       double period) noexcept {
-  size_ = 0;
+SpeedConstraint::SpeedConstraint(const Robot& robot) : speeds_(robot), frames_(speeds_.places().size(), -1) {}
+
+void SpeedConstraint::append(const Moment& now, Bounds&, RowBlock& rows) noexcept {
+  if (now.speed.state == nullptr) {
+    return;
+  }
+  const KinematicState& state = *now.speed.state;
+  const double limit = now.speed.limit, period = now.period;
   const double k = std::min(decay, most_per_period / period);
-  const double falls = aimed * (next_limit - limit) / period;
-  const double stop_time = state.v().cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
-  for (const Place& place : frames_) {
+  const double falls = aimed * (now.speed.next_limit - limit) / period;
+  const double stop_time = state.v().cwiseAbs().cwiseQuotient(*now.speed.acceleration_limits).maxCoeff();
+  for (const FrameSpeeds::Place& place : speeds_.places()) {
     const KinematicState::Link& link = state.link(place.joint);
     const auto [p, p_dot] = motion_of(link, place.p);
     const double speed = p_dot.norm();
@@ -91,7 +92,7 @@ void SpeedRows::update(const KinematicState& state, const JointLimits& limits, d
     }
     const Eigen::Vector3d n = p_dot / speed;
     const Eigen::Vector3d bias = link.bias.linear + link.bias.angular.cross(p) + link.velocity.angular.cross(p_dot);
-    auto normal = normals.row(size_);
+    auto normal = rows.normals.row(rows.size);
     normal.setZero();
     const SpatialForce along{p.cross(n), n};
     for (int j = place.joint; j >= 0; j = state.link(j).parent) {
@@ -105,21 +106,26 @@ void SpeedRows::update(const KinematicState& state, const JointLimits& limits, d
     normal /= length;
     // Without acceleration limits a stop takes no time, and a row may ask for anything.
     const double stop = stop_time > 0.0 ? -speed / stop_time : -speed / period;
-    upper[size_] = std::max(falls + k * (aimed * limit - speed) - n.dot(bias), stop) / length;
-    lengths[size_] = length;
-    frames[static_cast<std::size_t>(size_++)] = place.frame;
+    rows.upper[rows.size] = std::max(falls + k * (aimed * limit - speed) - n.dot(bias), stop) / length;
+    rows.lengths[rows.size] = length;
+    frames_[static_cast<std::size_t>(rows.size++)] = place.frame;
   }
 }
 
-bool SpeedRows::satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept {
+void SpeedConstraint::report(const Moment&, const Bounds&, const RowBlock& rows, const Eigen::VectorXd& wanted,
+                             TorqueSolution& solution) const noexcept {
   double largest = 0.0;
-  for (Eigen::Index j = 0; j < box_lower.size(); ++j) {
-    const double n = normals(k, j);
-    if (n != 0.0) {
-      largest += n > 0.0 ? n * box_upper[j] : n * box_lower[j];
+  for (int k = 0; k < rows.size; ++k) {
+    const double slack = rows.shortfall(k, solution.acceleration, wanted.norm());
+    if (slack > solution.speed_slack || (solution.speed_slack == 0.0 && rows.multipliers[k] > largest)) {
+      solution.speed_slack = slack;
+      solution.speed_frame = frames_[static_cast<std::size_t>(k)];
+      largest = rows.multipliers[k];
     }
   }
-  return largest <= upper[k];
+  if (solution.speed_slack > 0.0) {
+    solution.status = std::max(solution.status, TorqueStatus::relaxed);
+  }
 }
 
 }  // namespace sidestep

@@ -1,9 +1,10 @@
-// What the torque controller does about clearances. The rest is in torque_controller_test.cpp.
+// What the program does about clearances. The rest is in motion_program_test.cpp.
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <limits>
 
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/clearance_demand.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 #include "support/allocations.hpp"
 #include "support/numbers.hpp"
 #include "support/random.hpp"
@@ -24,9 +25,9 @@ struct Approach {
     clearances.rates[1] = -0.1;
     clearances.gradients(2, 1) = 0.5;
   }
-  TorqueStatus solve(TorqueController& controller, TorqueSolution& solution) {
+  TorqueStatus solve(MotionProgram& controller, TorqueSolution& solution) {
     clearances.mind_nearest();
-    return controller.solve(q, v, a, M, h, &clearances, solution);
+    return controller.solve({q, v, a, M, h, &clearances}, solution);
   }
   /// What the clearance asks of joint 2 [/s²]: half of 0.5 · 10 m/s² is planned with.
   double required() const { return demanded_deceleration(0.005, 0.1, {2.5, 5.0, 20.0, 0.5}, 0.001) / 0.5; }
@@ -39,7 +40,7 @@ struct Approach {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(a_clearance_bends_the_task) {
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);
   Approach in;
   in.a.setConstant(-5.0);
@@ -61,21 +62,21 @@ BOOST_AUTO_TEST_CASE(a_clearance_bends_the_task) {
 }
 
 BOOST_AUTO_TEST_CASE(a_clearance_that_is_kept_anyway_changes_nothing) {
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution with(nv), without(nv);
   Approach in;
   in.a.setConstant(4.5);
   BOOST_TEST((in.solve(controller, with) == TorqueStatus::ok));
   BOOST_TEST(with.dominant == -1);
   BOOST_TEST(with.num_safety_rows == 1);
-  BOOST_TEST((controller.solve(in.q, in.v, in.a, in.M, in.h, without) == TorqueStatus::ok));
+  BOOST_TEST((controller.solve({in.q, in.v, in.a, in.M, in.h}, without) == TorqueStatus::ok));
   BOOST_TEST((with.torque.array() == without.torque.array()).all());
   BOOST_TEST(without.num_safety_rows == 0);
 }
 
 BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   // Something comes, with a curvature of -9: 0.5 q̈_2 >= 9 + 2 asks for 22 /s², the limit is 10. Torque allows 87.
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);
   Approach in;
   in.v.setZero();
@@ -88,9 +89,9 @@ BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   BOOST_TEST(solution.dominant == 0);
   BOOST_TEST(contains(solution.active[2], Limit::acceleration_upper));
 
-  TorqueControllerSettings settings;
+  MotionProgramSettings settings;
   settings.hard_bounds = true;
-  TorqueController hard(test::serial_arm(test::arm_limits(nv)), settings);
+  MotionProgram hard(test::serial_arm(test::arm_limits(nv)), settings);
   BOOST_TEST((in.solve(hard, solution) == TorqueStatus::relaxed_safety));
   BOOST_TEST(solution.acceleration[2] == 10.0, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(solution.safety[0].slack == 0.5 * (asked - 10.0), boost::test_tools::tolerance(1e-9));
@@ -101,9 +102,9 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot
   JointLimits limits = test::arm_limits(nv);
   limits.acceleration[0] = limits.effort[0] = std::numeric_limits<double>::infinity();
   limits.velocity[0] = 2.0;
-  TorqueControllerSettings settings;
+  MotionProgramSettings settings;
   settings.hard_bounds = true;
-  TorqueController controller(test::serial_arm(limits), settings);
+  MotionProgram controller(test::serial_arm(limits), settings);
   TorqueSolution solution(nv);
   Approach in;
   in.v.setZero();
@@ -129,7 +130,7 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot
 }
 
 BOOST_AUTO_TEST_CASE(torque_limits_stand_above_clearances) {
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);
   Approach in;
   in.v.setZero();
@@ -149,7 +150,7 @@ BOOST_AUTO_TEST_CASE(torque_limits_stand_above_clearances) {
 
 BOOST_AUTO_TEST_CASE(position_limits_are_not_given_up_for_comfort) {
   // The clearance wants joint 2 upwards with 22 /s², and 1 µrad is left to its position limit.
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);
   Approach in;
   in.clearances.curvatures[1] = -9.0;
@@ -165,7 +166,7 @@ BOOST_AUTO_TEST_CASE(position_limits_are_not_given_up_for_comfort) {
 }
 
 BOOST_AUTO_TEST_CASE(unusable_clearances_stop_the_arm) {
-  TorqueController controller(test::serial_arm(test::arm_limits(nv)));
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv), stop(nv);
   Approach in;
   in.a.setConstant(5.0);
@@ -174,7 +175,7 @@ BOOST_AUTO_TEST_CASE(unusable_clearances_stop_the_arm) {
   BOOST_TEST((solution.fault == TorqueFault::clearances));
   BOOST_TEST(solution.num_safety_rows == 0);
   in.a = -in.v / controller.settings().stop_time;
-  static_cast<void>(controller.solve(in.q, in.v, in.a, in.M, in.h, stop));
+  static_cast<void>(controller.solve({in.q, in.v, in.a, in.M, in.h}, stop));
   BOOST_TEST((solution.torque.array() == stop.torque.array()).all());
 }
 
@@ -182,7 +183,7 @@ BOOST_AUTO_TEST_CASE(many_clearances_on_every_path_are_optimal_or_reported_and_n
   Random random(5);
   int stops = 0;
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 3000; ++trial) {
     const int num = random.integer(0, 40);
@@ -207,7 +208,7 @@ BOOST_AUTO_TEST_CASE(many_clearances_on_every_path_are_optimal_or_reported_and_n
     const Eigen::VectorXd a = random.magnitude(0.1, 100.0) * random.vector(nv);
     const Eigen::MatrixXd M = test::random_mass(random, nv);
     BOOST_REQUIRE_EQUAL(
-        test::allocations_of([&] { static_cast<void>(controller.solve(q, v, a, M, h, &clearances, solution)); }), 0u);
+        test::allocations_of([&] { static_cast<void>(controller.solve({q, v, a, M, h, &clearances}, solution)); }), 0u);
     BOOST_REQUIRE(solution.status <= TorqueStatus::relaxed_safety);
     BOOST_REQUIRE((solution.torque.array().abs() <= limits.effort.array()).all());
     double worst = 0.0;

@@ -1,4 +1,4 @@
-#include "sidestep/constraints/safety_rows.hpp"
+#include "sidestep/constraints/clearance_constraints.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
@@ -20,6 +20,32 @@ ClosingLimits random_limits(Random& random) {
   const double A = random.magnitude(0.01, 100.0);
   return {A, 2.0 * A, random.magnitude(1.0, 50.0), random.uniform(0.1, 1.0)};
 }
+
+/// The rows of clearances alone, for one state after the other.
+struct Rows : RowBlock {
+  Rows(int nv, const SafetySettings& settings)
+      : RowBlock((settings.validate(), settings.max_rows), nv, Priority::clearance),
+        constraint(JointLimits::unlimited(nv), settings) {}
+
+  void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
+           double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept {
+    constraint.add(clearances, {v, limits, bounds, period, torque, last}, *this);
+  }
+  void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
+              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr,
+              const LastMotion* last = nullptr) noexcept {
+    clear();
+    add(clearances, v, limits, bounds, period, torque, last);
+  }
+  bool relax_to_braking(double period) noexcept { return constraint.relax_to_braking(period, *this); }
+  bool add_recovery() noexcept { return constraint.add_recovery(*this); }
+  bool usable(const Clearances& clearances) const noexcept { return constraint.usable(clearances); }
+
+  ClearanceConstraints constraint;
+  const std::vector<int>& coordinates = constraint.coordinates();
+  const std::vector<int>& nearest = constraint.nearest();
+  const std::vector<char>& along_path = constraint.along_path();
+};
 
 /// p(u) of the derivation, written out once more.
 double room_needed(double u, const ClosingLimits& limits) {
@@ -186,11 +212,11 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.mind_nearest();
   clearances.curvatures[1] = -5.7;
   clearances.approach.curvatures[1] = -0.7;
-  SafetyRows rows(2, {});
+  Rows rows(2, {});
   const AccelerationBounds anything(2);
   Eigen::VectorXd v = Eigen::VectorXd::Zero(2);
   rows.update(clearances, v, limits, anything, 0.001);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.coordinates[0] == 1);
   BOOST_TEST(rows.nearest[0] == 7);
   BOOST_TEST(rows.lengths[0] == 0.5, boost::test_tools::tolerance(1e-15));
@@ -243,29 +269,29 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(1);
   const LastMotion last{still, 1.0};
   AccelerationBounds bounds(1);
-  SafetyRows rows(1, {});
+  Rows rows(1, {});
   const auto ask = [&](double room, double closing, double of_arm) {
     const Eigen::VectorXd v = Eigen::VectorXd::Constant(1, -of_arm);
     bounds.update(limits, still, v, 0.001, {}, &still);
     Clearances clearances(1, 1);
     clearances.nearest << 0;
-    clearances.values[0] = room + rows.settings().margin;
+    clearances.values[0] = room + rows.constraint.settings().margin;
     clearances.rates[0] = -closing;
     clearances.gradients.col(0) << 1.0;
     clearances.mind_nearest();
     rows.update(clearances, v, limits, bounds, 0.001, nullptr, &last);
-    BOOST_REQUIRE(rows.size() == 1);
+    BOOST_REQUIRE(rows.size == 1);
   };
   // With 5 m/s² and half of the jerk the stop from 0.4 m/s takes 22 mm; the arm's own, with 10 m/s² and all jerk, 10.2 mm.
   ask(0.022, 0.4, 0.4);
   BOOST_TEST(rows.lower[0] == 0.5, boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.relax_to_braking(0.001));
   BOOST_TEST(rows.lower[0] == -0.95, boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(!rows.ask_for_ways_back());
+  BOOST_TEST(!rows.add_recovery());
 
   ask(0.0107, 0.4, 0.4);
   const double asked = rows.lower[0];
-  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.relax_to_braking(0.001));
   const double least = rows.lower[0];
   BOOST_TEST((least > -0.95 && least < asked));
   const auto way = [](double x) {
@@ -277,26 +303,26 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   // Without room and without closing the way back asks for what jerk allows; as a reserve, for nothing.
   ask(-0.03, 0.0, 0.0);
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.relax_to_braking(0.001));
   BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));  // 0.1 mm/s is none
-  BOOST_TEST(rows.ask_for_ways_back());
+  BOOST_TEST(rows.add_recovery());
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
 
   // Where the clearance is not lost, the way back is a row of its own, which counts less than what keeps it from closing.
   ask(-0.003, 0.0, 0.0);
   const double back = rows.lower[0];
-  BOOST_TEST(rows.draw_on_reserves(0.001));
-  BOOST_TEST(rows.ask_for_ways_back());
-  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.relax_to_braking(0.001));
+  BOOST_TEST(rows.add_recovery());
+  BOOST_REQUIRE(rows.size == 2);
   BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));
   BOOST_TEST((rows.lower[1] == back && rows.depths[0] == 0.0 && rows.depths[1] > 0.0));
   BOOST_TEST(rows.normals(1, 0) == rows.normals(0, 0));
 
   // What closes in without room has no reserve, nor has what the arm's own stop does not stop.
   ask(-0.003, 0.1, 0.1);
-  BOOST_TEST(!rows.draw_on_reserves(0.001));
+  BOOST_TEST(!rows.relax_to_braking(0.001));
   ask(0.022, 0.4, 0.0);
-  BOOST_TEST(!rows.draw_on_reserves(0.001));
+  BOOST_TEST(!rows.relax_to_braking(0.001));
 }
 
 BOOST_AUTO_TEST_CASE(what_accelerations_and_torques_together_give_is_counted_on) {
@@ -315,12 +341,12 @@ BOOST_AUTO_TEST_CASE(what_accelerations_and_torques_together_give_is_counted_on)
   clearances.approach.rates[0] = clearances.rates[0] = -1.0;
   clearances.approach.curvatures[0] = clearances.curvatures[0] = 0.0;
   clearances.margins[0] = test::infinity;
-  SafetyRows rows(2, {});
+  Rows rows(2, {});
   const AccelerationBounds anything(2);
   const Eigen::VectorXd v = Eigen::Vector2d::Zero();  // the obstacle comes
   rows.update(clearances, v, limits, anything, 0.001, &torque);
   const double expected = demanded_deceleration(0.1, 1.0, {2.25, 4.7, 20.0, 0.5}, 0.001);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == expected, boost::test_tools::tolerance(1e-12));
 }
 
@@ -346,27 +372,27 @@ BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
       }
     }
     clearances.mind_nearest();
-    SafetyRows rows(5, settings);
+    Rows rows(5, settings);
     BOOST_REQUIRE(rows.usable(clearances));
     rows.update(clearances, v, limits, AccelerationBounds(5), 0.001);
-    BOOST_REQUIRE_EQUAL(rows.size(), std::min(within_reach, 6));
+    BOOST_REQUIRE_EQUAL(rows.size, std::min(within_reach, 6));
     const auto urgency = [&](int k) { return clearances.values[k] + clearances.rates[k] / settings.rate; };
-    for (int row = 1; row < rows.size(); ++row) {
+    for (int row = 1; row < rows.size; ++row) {
       BOOST_REQUIRE_LE(urgency(rows.coordinates[static_cast<std::size_t>(row) - 1]),
                        urgency(rows.coordinates[static_cast<std::size_t>(row)]));
     }
     int more_urgent = 0;
-    for (int k = 0; rows.size() > 0 && k < num; ++k) {
+    for (int k = 0; rows.size > 0 && k < num; ++k) {
       const bool counts = clearances.nearest[k] >= 0 && clearances.gradients.col(k).norm() > 0.0;
-      more_urgent += counts && urgency(k) <= urgency(rows.coordinates[static_cast<std::size_t>(rows.size()) - 1]) ? 1 : 0;
+      more_urgent += counts && urgency(k) <= urgency(rows.coordinates[static_cast<std::size_t>(rows.size) - 1]) ? 1 : 0;
     }
-    BOOST_REQUIRE_EQUAL(more_urgent, rows.size());
+    BOOST_REQUIRE_EQUAL(more_urgent, rows.size);
   }
 }
 
 BOOST_AUTO_TEST_CASE(unusable_clearances_are_noticed) {
   Random random(3);
-  const SafetyRows rows(4, {});
+  const Rows rows(4, {});
   const Clearances good = linear_clearances(random, 4, 3);
   BOOST_TEST(rows.usable(good));
   BOOST_TEST(!rows.usable(linear_clearances(random, 3, 3)));
@@ -398,7 +424,7 @@ BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
     SafetySettings settings;
     change(settings);
     try {
-      SafetyRows rows(3, settings);
+      Rows rows(3, settings);
     } catch (const std::invalid_argument& error) {
       return std::string(error.what());
     }
@@ -423,13 +449,13 @@ BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_ou
   Clearances clearances(2, 1);
   clearances.nearest << 0;
   clearances.gradients.col(0) << 0.6, -0.8;
-  SafetyRows rows(2, {});
+  Rows rows(2, {});
   AccelerationBounds bounds(2);
   bounds.lower << -10.0, -5.0;  // close to its lower limit the second joint cannot give all
   bounds.upper << 10.0, 10.0;
   const double now = 0.6 * 10.0 + 0.8 * 5.0;
   const auto lower = [&](double room, double closing, double curvature) {
-    clearances.values << room + rows.settings().margin;
+    clearances.values << room + rows.constraint.settings().margin;
     clearances.rates << -closing;
     clearances.curvatures << curvature;
     clearances.mind_nearest();
@@ -462,12 +488,12 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   clearances.gradients.col(0) << 0.6, 0.8;
   Eigen::VectorXd v(2);
   v << -2.0, 1.0;  // closing in with 0.4 m/s; stops in 0.2 s
-  SafetyRows rows(2, {});
+  Rows rows(2, {});
   AccelerationBounds bounds(2);
   bounds.lower << -10.0, -10.0;
   bounds.upper << 10.0, 10.0;
   const auto update = [&](double room, double closing, double curvature, const BrakingTorque* torque = nullptr) {
-    clearances.values << room + rows.settings().margin;
+    clearances.values << room + rows.constraint.settings().margin;
     clearances.rates << -closing;
     clearances.curvatures << curvature;
     clearances.mind_nearest();
@@ -481,7 +507,7 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   // 0.4 · 0.2/2 + 7 · 0.2²/8 = 0.075 of the 0.08 m: its share of −v/τ is 0.4/0.2.
   update(0.08, 0.4, -7.0);
   BOOST_TEST_REQUIRE(asked(0.08, 0.4, -7.0) > 2.0);
-  BOOST_TEST_REQUIRE(rows.size() == 1);
+  BOOST_TEST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == 2.0, close);
   // Less, where less is demanded.
   update(0.081, 0.4, -0.5);
@@ -491,13 +517,13 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   // 0.04 + 0.05 m are too much, but of the 14 m/s² that the bounds give 12 are enough for the next period.
   update(0.08, 0.4, -10.0);
   BOOST_TEST_REQUIRE(asked(0.08, 0.4, -10.0) < 14.0);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == asked(0.08, 0.4, -10.0), close);
 
   // Here they are not: the arm has to stop κ times as hard.
   update(0.08, 0.4, -20.0);
   BOOST_TEST_REQUIRE(asked(0.08, 0.4, -20.0) > 14.0);
-  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_REQUIRE(rows.size == 2);
   const double hardness = rows.lower[0] / 2.0;
   BOOST_TEST(hardness > 1.0);
   BOOST_TEST(0.04 / hardness + 0.1 / (hardness * hardness) == 0.08, close);
@@ -513,18 +539,18 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   }
   // Where the room is all but gone the stop is no harder than twice what meets the demand,
   update(1e-9, 0.4, -20.0);
-  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_REQUIRE(rows.size == 2);
   BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -20.0), close);
   BOOST_TEST(rows.lower[1] == 2.0 * asked(1e-9, 0.4, -20.0) / 2.0 * v.norm() / 0.2, close);
   // not asked for where the gradient does something about the curvature,
   update(1e-9, 0.4, -1.0);
   BOOST_TEST_REQUIRE(asked(1e-9, 0.4, -1.0) > 14.0);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -1.0), close);
   // and where no stop meets the demand, at a crest, takes half of the velocity in a period.
   clearances.gradients.col(0) << 0.4, 0.8;
   update(1e-9, 0.0, -20.0);
-  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_REQUIRE(rows.size == 2);
   BOOST_TEST(rows.lower[0] * rows.lengths[0] == 0.0, boost::test_tools::tolerance(1e-9));
   BOOST_TEST(rows.lower[1] == 0.5 * v.norm() / 0.001, close);
   clearances.gradients.col(0) << 0.6, 0.8;
@@ -533,23 +559,23 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   update(0.08, 0.4, -12.5);
   BOOST_TEST_REQUIRE(asked(0.08, 0.4, -12.5) > 14.0);
   BOOST_TEST_REQUIRE(0.4 * 0.4 / (2.0 * (14.0 - 12.5)) < 0.08);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] <= 14.0);
 
   // Without room for one more row the least critical one gives way.
   SafetySettings single;
   single.max_rows = 1;
-  SafetyRows one(2, single);
+  Rows one(2, single);
   clearances.values << 0.085;
   clearances.curvatures << -20.0;
   clearances.mind_nearest();
   one.update(clearances, v, limits, bounds, 0.001);
-  BOOST_REQUIRE(one.size() == 1);
+  BOOST_REQUIRE(one.size == 1);
   BOOST_TEST((one.along_path[0] == 1));
 
   // What comes by itself does not stop with the arm.
   update(0.08, 0.5, -20.0);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST((rows.along_path[0] == 0));
   BOOST_TEST(rows.lower[0] == asked(0.08, 0.5, -20.0), close);
 
@@ -559,11 +585,11 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   bias << -14.0, 0.0;
   const BrakingTorque torque{mass, cholesky, bias};
   update(0.08, 0.4, -7.0, &torque);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == 0.4 / 0.2, close);
   bias[0] = 14.0;
   update(0.2, 0.4, -2.0, &torque);
-  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] == 0.4 / 0.5, close);
 }
 
@@ -573,7 +599,7 @@ BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) 
   limits.acceleration << 10.0;
   Clearances clearances(1, 1);
   clearances.nearest << 0;
-  SafetyRows rows(1, {});
+  Rows rows(1, {});
   AccelerationBounds bounds(1);
   bounds.lower << -10.0;
   bounds.upper << 10.0;
@@ -588,7 +614,7 @@ BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) 
     clearances.mind_nearest();
     rows.update(clearances, v, limits, bounds, 0.001);
     double a = v[0] < 2.0 ? 10.0 : 0.0;
-    for (int row = 0; row < rows.size(); ++row) {
+    for (int row = 0; row < rows.size; ++row) {
       if (rows.normals(row, 0) < 0.0) {
         a = std::min(a, -rows.lower[row]);
       }
@@ -608,7 +634,7 @@ BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) 
 BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
   Random random(4);
   const JointLimits limits = test::arm_limits(7);
-  SafetyRows rows(7, {});
+  Rows rows(7, {});
   const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(7, 7), cholesky = mass;
   const Eigen::VectorXd bias = Eigen::VectorXd::Zero(7), v = bias;
   const BrakingTorque torque{mass, cholesky, bias};
@@ -634,7 +660,7 @@ BOOST_AUTO_TEST_CASE(changing_points_never_make_a_surface_recede) {
   clearances.rates << -0.4;
   clearances.gradients << 1.0;
   clearances.mind_nearest();
-  SafetyRows rows(1, {});
+  Rows rows(1, {});
   const double demand = demanded_deceleration(0.1, 0.4, {5.0, 10.0, 20.0, 0.5}, 0.001);
   const auto lower = [&](double of_nearest, double of_points) {
     clearances.curvatures << of_nearest;
@@ -660,14 +686,14 @@ BOOST_AUTO_TEST_CASE(rows_of_a_second_state_are_added_to_those_of_the_first) {
   for (int trial = 0; trial < 300; ++trial) {
     const Clearances first = linear_clearances(random, 4, 5), second = linear_clearances(random, 4, 5);
     const Eigen::VectorXd v = random.vector(4), other = random.vector(4);
-    SafetyRows both(4, {}), one(4, {}), two(4, {});
+    Rows both(4, {}), one(4, {}), two(4, {});
     one.update(first, v, limits, bounds, 0.001);
     two.update(second, other, limits, bounds, 0.001);
     both.update(first, v, limits, bounds, 0.001);
     both.add(second, other, limits, bounds, 0.001);
-    BOOST_REQUIRE(both.size() == one.size() + two.size());
-    const auto has = [&](const SafetyRows& part, int row) {
-      for (int k = 0; k < both.size(); ++k) {
+    BOOST_REQUIRE(both.size == one.size + two.size);
+    const auto has = [&](const Rows& part, int row) {
+      for (int k = 0; k < both.size; ++k) {
         if ((both.normals.row(k) == part.normals.row(row)) && both.lower[k] == part.lower[row] &&
             both.coordinates[static_cast<std::size_t>(k)] == part.coordinates[static_cast<std::size_t>(row)]) {
           return true;
@@ -675,13 +701,13 @@ BOOST_AUTO_TEST_CASE(rows_of_a_second_state_are_added_to_those_of_the_first) {
       }
       return false;
     };
-    for (int k = 0; k < one.size(); ++k) {
+    for (int k = 0; k < one.size; ++k) {
       BOOST_REQUIRE(has(one, k));
     }
-    for (int k = 0; k < two.size(); ++k) {
+    for (int k = 0; k < two.size; ++k) {
       BOOST_REQUIRE(has(two, k));
     }
-    most = std::max(most, both.size());
+    most = std::max(most, both.size);
   }
   BOOST_TEST(most > 5);
 }

@@ -1,4 +1,4 @@
-#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -8,6 +8,7 @@
 #include "support/numbers.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
+#include "support/without_torque.hpp"
 
 using namespace sidestep;
 using test::not_a_number;
@@ -49,7 +50,7 @@ BOOST_AUTO_TEST_CASE(walls_in_joint_space_are_never_passed) {
   const double margin = SafetySettings().margin;
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 40; ++trial) {
-    AccelerationFilter filter(test::serial_arm(limits));
+    MotionProgram filter(test::serial_arm(limits), test::without_torque());
     const Walls walls(random, random.integer(1, 12), 0.0);
     Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, wanted = q;
     double lowest = 1.0;
@@ -59,7 +60,7 @@ BOOST_AUTO_TEST_CASE(walls_in_joint_space_are_never_passed) {
       }
       const Clearances clearances = walls.at(q, v, 0.0);
       lowest = std::min(lowest, clearances.values.minCoeff());
-      static_cast<void>(filter.apply(q, v, wanted, &clearances, solution));
+      static_cast<void>(filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances}, solution));
       BOOST_REQUIRE((solution.acceleration.array() <= solution.upper.array()).all());
       BOOST_REQUIRE((solution.acceleration.array() >= solution.lower.array()).all());
       v += 0.001 * solution.acceleration;
@@ -77,7 +78,7 @@ BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
   const JointLimits limits = test::arm_limits(nv);
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 40; ++trial) {
-    AccelerationFilter filter(test::serial_arm(limits));
+    MotionProgram filter(test::serial_arm(limits), test::without_torque());
     Walls walls(random, 1, 0.0);
     walls.speeds.setConstant(-0.2);  // [m/s] towards the arm, for 2 s: 0.4 m
     Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q;
@@ -86,7 +87,8 @@ BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
       const Clearances clearances = walls.at(q, v, 0.001 * k);
       lowest = std::min(lowest, clearances.values[0]);
       const Eigen::VectorXd wanted = -100.0 * q - 20.0 * v;  // wants to stay
-      BOOST_REQUIRE(filter.apply(q, v, wanted, &clearances, solution) <= TorqueStatus::limited);
+      BOOST_REQUIRE(filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances}, solution) <=
+                    TorqueStatus::limited);
       v += 0.001 * solution.acceleration;
       q += 0.001 * v;
     }
@@ -97,7 +99,7 @@ BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
 
 BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   const JointLimits limits = test::arm_limits(nv);
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv);
   Clearances clearances(nv, 2);
   clearances.nearest << -1, 5;
@@ -107,7 +109,8 @@ BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   clearances.gradients(2, 1) = 0.5;
   clearances.mind_nearest();
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;  // something comes
-  BOOST_TEST((filter.apply(q, v, a, &clearances, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST(
+      (filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, solution) == TorqueStatus::relaxed_safety));
   BOOST_TEST(solution.acceleration[2] == 10.0);
   BOOST_TEST(contains(solution.active[2], Limit::acceleration_upper));
   BOOST_REQUIRE(solution.num_safety_rows == 1);
@@ -119,13 +122,13 @@ BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
 BOOST_AUTO_TEST_CASE(without_clearances_only_the_joint_limits_count) {
   Random random(2);
   const JointLimits limits = test::arm_limits(nv);
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 1000; ++trial) {
     const Eigen::VectorXd q = (2.0 * random.vector(nv)).cwiseMax(limits.lower).cwiseMin(limits.upper);
     const Eigen::VectorXd v = random.vector(nv).cwiseMax(-limits.velocity).cwiseMin(limits.velocity);
     const Eigen::VectorXd a = 10.0 * random.vector(nv);
-    static_cast<void>(filter.apply(q, v, a, nullptr, solution));
+    static_cast<void>(filter.solve({.q = q, .v = v, .acceleration = a}, solution));
     const Eigen::VectorXd clipped = a.cwiseMax(solution.lower).cwiseMin(solution.upper);
     BOOST_REQUIRE_SMALL((solution.acceleration - clipped).norm(), 1e-12);  // rounding of accelerations around 10
   }
@@ -134,7 +137,7 @@ BOOST_AUTO_TEST_CASE(without_clearances_only_the_joint_limits_count) {
 BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is_allocated) {
   Random random(3);
   const JointLimits limits = test::arm_limits(nv);
-  AccelerationFilter filter(test::serial_arm(limits));
+  MotionProgram filter(test::serial_arm(limits), test::without_torque());
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 2000; ++trial) {
     const Walls walls(random, random.integer(0, 40), 0.3);
@@ -147,7 +150,10 @@ BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is
       case 3: clearances.approach.gradients.setConstant(not_a_number); break;
       default: break;
     }
-    BOOST_REQUIRE_EQUAL(test::allocations_of([&] { static_cast<void>(filter.apply(q, v, a, &clearances, solution)); }), 0u);
+    BOOST_REQUIRE_EQUAL(
+        test::allocations_of(
+            [&] { static_cast<void>(filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, solution)); }),
+        0u);
     BOOST_REQUIRE(solution.acceleration.allFinite());
     BOOST_REQUIRE((solution.acceleration.array().abs() <= limits.acceleration.array()).all());
   }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sidestep/constraints/constraint.hpp"
 #include "sidestep/math/fields.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
 #include "sidestep/robot/robot.hpp"
@@ -42,10 +43,10 @@ struct SpeedLimitSettings {
 template <>
 const std::vector<Field<SpeedLimitSettings>>& fields();
 
-/// One linear constraint on the acceleration per frame that joints move: normal·q̈ ≤ upper, with unit normals.
-class SpeedRows {
+/// The distinct frames of an arm that joints move, and how fast they are.
+class FrameSpeeds {
  public:
-  explicit SpeedRows(const Robot& robot);
+  explicit FrameSpeeds(const Robot& robot);
 
   /// The speed of the fastest frame [m/s], and which it is (-1: none moves).
   struct Fastest {
@@ -54,27 +55,33 @@ class SpeedRows {
   };
   Fastest fastest(const KinematicState& state) const noexcept;
 
-  /// The rows at a state whose frames may move with `limit` [m/s] now and `next_limit` after the period. No allocation.
-  void update(const KinematicState& state, const JointLimits& limits, double limit, double next_limit, double period) noexcept;
-
-  /// Whether every acceleration with box_lower <= q̈ <= box_upper satisfies row k.
-  bool satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept;
-
-  int size() const noexcept { return size_; }
-  int max_size() const noexcept { return static_cast<int>(frames_.size()); }
-
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> normals;  ///< (max, nv), the first size() in use
-  Eigen::VectorXd upper;                                                           ///< (max) [rad/s²]
-  Eigen::VectorXd lengths;                                                         ///< (max) |n·J| [m/rad]
-  std::vector<int> frames;  ///< (max) which frame of the robot a row belongs to
-
- private:
   struct Place {
     int frame, joint;
     Eigen::Vector3d p;  // of the joint's child
   };
-  std::vector<Place> frames_;
-  int size_ = 0;
+  const std::vector<Place>& places() const noexcept { return places_; }
+
+ private:
+  std::vector<Place> places_;
+};
+
+/// Speed near obstacles: one row normal·q̈ ≤ upper per frame that joints move.
+class SpeedConstraint : public Constraint {
+ public:
+  explicit SpeedConstraint(const Robot& robot);
+
+  Priority priority() const noexcept override { return Priority::comfort; }
+  int max_rows() const noexcept override { return static_cast<int>(frames_.size()); }
+  void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept override;
+  /// Names the frame that is slowed most.
+  void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
+              TorqueSolution& solution) const noexcept override;
+
+  const std::vector<int>& frames() const noexcept { return frames_; }  ///< frame of each row
+
+ private:
+  FrameSpeeds speeds_;
+  std::vector<int> frames_;
 };
 
 }  // namespace sidestep

@@ -1,4 +1,4 @@
-#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/constraints/motion_program.hpp"
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
@@ -40,8 +40,8 @@ Input random_input(Random& random, const JointLimits& limits) {
   return in;
 }
 
-TorqueStatus solve(TorqueController& controller, const Input& in, TorqueSolution& solution) {
-  return controller.solve(in.q, in.v, in.a, in.M, in.h, solution);
+TorqueStatus solve(MotionProgram& controller, const Input& in, TorqueSolution& solution) {
+  return controller.solve({in.q, in.v, in.a, in.M, in.h}, solution);
 }
 
 bool within_effort(const TorqueSolution& solution, const JointLimits& limits) {
@@ -53,7 +53,7 @@ bool within_effort(const TorqueSolution& solution, const JointLimits& limits) {
 BOOST_AUTO_TEST_CASE(a_reachable_acceleration_is_tracked) {
   Random random(1);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 1000; ++trial) {
     Input in = random_input(random, limits);
@@ -72,10 +72,10 @@ BOOST_AUTO_TEST_CASE(a_reachable_acceleration_is_tracked) {
 BOOST_AUTO_TEST_CASE(the_thesis_weights_let_the_arm_sag) {
   // Why the default torque weight is small: with Q = 30 and R = 1 per (Nm)^2, holding 50 Nm at rest.
   const JointLimits limits = test::arm_limits(nv);
-  TorqueControllerSettings settings;
+  MotionProgramSettings settings;
   settings.tracking_weight.setConstant(30.0);
   settings.torque_weight = limits.effort.cwiseAbs2();
-  TorqueController thesis(test::serial_arm(limits), settings), ours(test::serial_arm(limits));
+  MotionProgram thesis(test::serial_arm(limits), settings), ours(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input in;
   in.h[1] = 50.0;
@@ -89,7 +89,7 @@ BOOST_AUTO_TEST_CASE(the_thesis_weights_let_the_arm_sag) {
 BOOST_AUTO_TEST_CASE(every_limit_is_kept_or_the_status_says_which_is_not) {
   Random random(2);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 20000; ++trial) {
     const Input in = random_input(random, limits);
@@ -112,7 +112,7 @@ BOOST_AUTO_TEST_CASE(every_limit_is_kept_or_the_status_says_which_is_not) {
 
 BOOST_AUTO_TEST_CASE(active_limits_are_named) {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input in;
   in.v[0] = 2.4999;  // 0.1 /s^2 below the velocity limit
@@ -137,7 +137,7 @@ BOOST_AUTO_TEST_CASE(active_limits_are_named) {
 
 BOOST_AUTO_TEST_CASE(torque_limits_stand_above_acceleration_bounds) {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input in;
   in.q[6] = 2.5;
@@ -157,7 +157,7 @@ BOOST_AUTO_TEST_CASE(a_simulated_arm_never_leaves_its_limits) {
   Random random(3);
   JointLimits limits = test::arm_limits(nv);
   limits.effort.setConstant(200.0);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input in;
   for (int k = 0; k < 20000; ++k) {
@@ -181,7 +181,7 @@ BOOST_AUTO_TEST_CASE(a_simulated_arm_never_leaves_its_limits) {
 BOOST_AUTO_TEST_CASE(unusable_wanted_acceleration_stops_within_all_limits) {
   Random random(4);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv), reference(nv);
   for (const double bad : {not_a_number, infinity, -infinity}) {
     Input in = random_input(random, limits);
@@ -197,7 +197,7 @@ BOOST_AUTO_TEST_CASE(unusable_wanted_acceleration_stops_within_all_limits) {
 
 BOOST_AUTO_TEST_CASE(unusable_input_gives_a_damped_stop) {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input good;
   good.v[0] = 1.0;
@@ -231,7 +231,7 @@ BOOST_AUTO_TEST_CASE(unusable_input_gives_a_damped_stop) {
   check([](Input& in) { in.M.setZero(); }, TorqueFault::mass_matrix, 3.0 - D0, 3.0 + 2.0 * D6);
   BOOST_TEST(solution.acceleration.hasNaN());
   // Everything broken, before any good input: no torque rather than a wrong one.
-  TorqueController fresh(test::serial_arm(limits));
+  MotionProgram fresh(test::serial_arm(limits));
   Input broken;
   broken.q.setConstant(not_a_number), broken.v.setConstant(not_a_number), broken.a.setConstant(not_a_number);
   broken.M.setConstant(not_a_number), broken.h.setConstant(not_a_number);
@@ -241,7 +241,7 @@ BOOST_AUTO_TEST_CASE(unusable_input_gives_a_damped_stop) {
 
 BOOST_AUTO_TEST_CASE(a_program_that_cannot_be_solved_gives_a_damped_stop) {
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   Input in;
   in.v[0] = 1.0;
@@ -255,7 +255,7 @@ BOOST_AUTO_TEST_CASE(a_program_that_cannot_be_solved_gives_a_damped_stop) {
 }
 
 BOOST_AUTO_TEST_CASE(arms_without_limits) {
-  TorqueController controller(test::serial_arm(JointLimits::unlimited(nv)));
+  MotionProgram controller(test::serial_arm(JointLimits::unlimited(nv)));
   TorqueSolution solution(nv);
   Random random(5);
   Input in;
@@ -272,16 +272,16 @@ BOOST_AUTO_TEST_CASE(arms_without_limits) {
 BOOST_AUTO_TEST_CASE(settings_of_the_torque_controller_are_checked) {
   const Robot arm = test::serial_arm(test::arm_limits(nv));
   const auto message_of = [&](auto&& change) {
-    TorqueControllerSettings settings;
+    MotionProgramSettings settings;
     change(settings);
     try {
-      TorqueController controller(arm, settings);
+      MotionProgram controller(arm, settings);
     } catch (const std::invalid_argument& error) {
       return std::string(error.what());
     }
     return std::string();
   };
-  using S = TorqueControllerSettings;
+  using S = MotionProgramSettings;
   BOOST_TEST(message_of([](S&) {}).empty());
   BOOST_TEST(message_of([](S& s) { s.period = 0.0; }).find("period is 0") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.period = not_a_number; }).find("period is") != std::string::npos);
@@ -307,7 +307,7 @@ BOOST_AUTO_TEST_CASE(statuses_have_names) {
 BOOST_AUTO_TEST_CASE(solve_allocates_nothing_on_any_path) {
   Random random(6);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueController controller(test::serial_arm(limits));
+  MotionProgram controller(test::serial_arm(limits));
   TorqueSolution solution(nv);
   for (int trial = 0; trial < 3000; ++trial) {
     Input in = random_input(random, limits);

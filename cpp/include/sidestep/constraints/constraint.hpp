@@ -1,0 +1,117 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+#include "sidestep/clearance/clearances.hpp"
+#include "sidestep/constraints/constraint_rows.hpp"
+#include "sidestep/constraints/motion_solution.hpp"
+#include "sidestep/robot/kinematic_state.hpp"
+
+namespace sidestep {
+
+/// What the last period's command was, where jerk and torque rate are to keep their limits; null leaves a limit out.
+struct LastCommand {
+  const Eigen::VectorXd* acceleration = nullptr;  ///< (nv) [/s^2]
+  const Eigen::VectorXd* torque = nullptr;        ///< (nv) [Nm | N]
+  /// (nv) The bias's gravity now, and its change since then [Nm | N]: effort and its rate keep their limits with and without
+  /// it, as drives that hold the arm themselves are told less.
+  const Eigen::VectorXd* gravity = nullptr;
+  const Eigen::VectorXd* gravity_change = nullptr;
+  /// Factor up to which the acceleration may exceed its limits, of feedback against what the model lacks, in [1, inf) [-].
+  double acceleration_factor = 1.0;
+  bool binds = true;  ///< the jerk limit; else clearances alone rise no faster than it allows
+  /// Where torques have a rate, clearances brake early enough to do it smoothly. Not while a trajectory leads past what is near: it
+  /// would be held back.
+  bool early = false;
+  /// (nv) What was decided of the clearances before [/s^2]: they ask for no more.
+  const Eigen::VectorXd* decided = nullptr;
+};
+
+/// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
+/// solved for.
+struct SecondState {
+  const Clearances* clearances = nullptr;  ///< null: none
+  const Eigen::VectorXd* velocity = nullptr;
+};
+
+/// Limit of Cartesian speed [m/s] now and after the period, at a state of the arm; null: none.
+struct SpeedLimitNow {
+  const KinematicState* state = nullptr;
+  const Eigen::VectorXd* acceleration_limits = nullptr;  ///< (nv) [/s²] of the stop along the path
+  double limit = std::numeric_limits<double>::infinity(), next_limit = limit;
+};
+
+/// Mass matrix, its Cholesky factor, and bias h [Nm | N] (Coriolis, centrifugal and gravity).
+struct BrakingTorque {
+  const Eigen::MatrixXd& mass;
+  const Eigen::MatrixXd& mass_cholesky;
+  const Eigen::VectorXd& bias;
+};
+
+/// What is violated already, before any row is written.
+struct Survey {
+  double least_clearance = std::numeric_limits<double>::infinity();  ///< [m]
+  int least_coordinate = -1, least_nearest = -1;
+  bool closes = false;  ///< what is below zero comes still nearer
+
+  bool lost() const noexcept { return least_clearance < 0.0; }
+};
+
+/// All that a constraint may read of one solve.
+struct Moment {
+  double period;  ///< [s] for which the acceleration is held
+  const Eigen::VectorXd& position;
+  const Eigen::VectorXd& velocity;
+  const Eigen::VectorXd* wanted;  ///< acceleration [/s²]; null: unusable
+  const BrakingTorque* dynamics;  ///< null: unusable
+  double jerk_share;              ///< share of the jerk limits with which torque keeps its rate [-]
+  bool keeps_torque_rate;         ///< some torque may change only at a limited rate from the last one
+  const LastCommand& last;
+  const Clearances* clearances;  ///< at the state; null: none
+  const SecondState& second;
+  const SpeedLimitNow& speed;
+  const Survey& found;  ///< complete when `append` is called
+};
+
+/// A bound on the acceleration of the next period. One subclass, one file; see docs/how-to/add-a-constraint.md.
+///
+/// Everything but the constructor is noexcept and allocates nothing. The program calls, in each solve and of all constraints in
+/// the order of its list: `usable`, `survey`, `append`; where not all can be kept, those below; at the end `report`.
+class Constraint {
+ public:
+  virtual ~Constraint() = default;
+
+  /// How its rows give way: never, clearance or comfort.
+  virtual Priority priority() const noexcept = 0;
+  /// Most rows that it ever appends.
+  virtual int max_rows() const noexcept = 0;
+  /// Appends its rows, whose block is empty, and narrows the bounds of all joints.
+  virtual void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept = 0;
+
+  /// Whether its input is finite and of the right size. Otherwise the arm is stopped within all other constraints.
+  virtual bool usable(const Moment&) const noexcept { return true; }
+  /// Says what is violated already.
+  virtual void survey(const Moment&, Survey&) const noexcept {}
+  /// Whether the damped stop keeps it too, for which the state alone is known.
+  virtual bool bounds_stop() const noexcept { return false; }
+
+  /// Writes `bounds.wide`, within which the acceleration stays after jerk or comfort gave way.
+  virtual void widen(Priority /*given_up*/, const Moment&, Bounds&) const noexcept {}
+  /// Weakens its rows to the least that keeps the current stop feasible, so that jerk need not give way. False: nothing to weaken.
+  virtual bool relax_to_braking(const Moment&, RowBlock&) noexcept { return false; }
+  /// Undoes relax_to_braking.
+  virtual void restore(RowBlock&) noexcept {}
+  /// After relax_to_braking: appends what it had given up as recovery, which gets what the jerk limits leave. False: none.
+  virtual bool add_recovery(RowBlock&) noexcept { return false; }
+  /// Where something is lost: puts off recovery that opposes the way out.
+  virtual void defer_recovery(const Moment&, RowBlock&) noexcept {}
+
+  /// Whether the command is within its limits but for rounding, which it takes away. False: the solution is none.
+  virtual bool admit(TorqueSolution&) const noexcept { return true; }
+  /// Writes what it did into the solution, and raises the status where it gave way. wanted: acceleration that was solved for.
+  virtual void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
+                      TorqueSolution& solution) const noexcept;
+};
+
+}  // namespace sidestep

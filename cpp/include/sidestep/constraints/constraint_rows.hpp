@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/constraints/acceleration_bounds.hpp"
+#include "sidestep/constraints/priority.hpp"
+#include "sidestep/robot/robot.hpp"
+
+namespace sidestep {
+
+/// Rows of one constraint: lower <= normal·q̈ <= upper with unit normals. A row that gives way has one side only.
+/// Memory is taken at construction.
+struct RowBlock {
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  RowBlock(int capacity, int num_coordinates, Priority how_it_gives_way);
+
+  void clear() noexcept;
+  /// Appends gradient·q̈ >= bound (or <= bound), gradient (nv) [m/rad or any unit per rad], bound [that unit /s²]; positive depth
+  /// [m]: how far the constraint is violated. A gradient that no joint changes sets `unreachable` if zero does not meet the bound.
+  /// Beyond the capacity nothing is appended.
+  void at_least(ConstVectorRef gradient, double bound, double depth = 0.0) noexcept;
+  void at_most(ConstVectorRef gradient, double bound, double depth = 0.0) noexcept;
+
+  int capacity() const noexcept { return static_cast<int>(normals.rows()); }
+  bool is_at_most(int k) const noexcept;
+  /// Whether every acceleration in the box satisfies row k.
+  bool satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept;
+  /// The bound of row k if it reads normal·q̈ >= bound; that of the row times -1 if it reads <=.
+  double required(int k) const noexcept;
+  /// By how much an acceleration misses `required` [/s²]; negative if it exceeds it.
+  double missing(int k, const Eigen::VectorXd& acceleration) const noexcept;
+  /// The same in the unit of the gradient, and 0 where it is rounding. `scale`: size of the accelerations that cancel [/s²].
+  double shortfall(int k, const Eigen::VectorXd& acceleration, double scale) const noexcept;
+  /// Multiplier >= 0 of row k from the signed one of a quadratic program.
+  double pressure(int k, double multiplier) const noexcept;
+
+  Priority priority;
+  int size = 0;
+  bool unreachable = false;      ///< a bound cannot be met, since no joint changes what it bounds
+  Matrix normals;                ///< (capacity, nv)
+  Eigen::VectorXd lower, upper;  ///< (capacity) [/s²]
+  Eigen::VectorXd lengths;       ///< (capacity) |gradient|
+  Eigen::VectorXd depths;        ///< (capacity) how far the constraint is violated already [m], else 0
+  Eigen::VectorXd multipliers;   ///< (capacity) cost of each row to the task in the last solution, >= 0
+
+ private:
+  bool append(ConstVectorRef gradient, double depth) noexcept;
+};
+
+/// An interval of accelerations per joint.
+struct Box {
+  explicit Box(int num_coordinates)
+      : lower(Eigen::VectorXd::Zero(num_coordinates)), upper(Eigen::VectorXd::Zero(num_coordinates)) {}
+  Eigen::VectorXd lower, upper;  ///< (nv) [/s²]
+};
+
+/// Interval of the torque less the bias, M q̈, and which limit gives either end.
+struct TorqueWindow {
+  explicit TorqueWindow(int num_coordinates);
+
+  /// Clamps a further interval of joint i into this one, so that a torque is always left.
+  void narrow(Eigen::Index i, double least, double most, Limit least_limit, Limit most_limit) noexcept;
+
+  Eigen::VectorXd lower, upper;  ///< (nv) [Nm | N]
+  std::vector<Limit> lower_limit, upper_limit;
+};
+
+/// What bounds all joints: read and narrowed by each constraint in turn.
+struct Bounds {
+  explicit Bounds(int num_coordinates)
+      : box(num_coordinates), firm_jerk(num_coordinates), wide(num_coordinates), torque(num_coordinates) {}
+
+  AccelerationBounds box;  ///< joint limits, with jerk (smooth), without it, and of position alone
+  Box firm_jerk;           ///< what the jerk limits leave if torques keep a rate, even after jerk gave way; infinite otherwise
+  Box wide;                ///< what joints may do after a priority gave way, see Constraint::widen
+  TorqueWindow torque;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "sidestep/constraints/constraint.hpp"
+
+namespace sidestep {
+
+/// What the arm does where no program can be solved: torque = M a + h with a = −v/time within the bounds, clipped to the effort limits
+/// and to what the rate allows. Without a usable mass matrix, h − D v clipped.
+struct DampedStop {
+  double time = 0.1;      ///< time constant [s]
+  double damping = 0.25;  ///< D without a mass matrix, as a fraction of effort limit / velocity limit [-]
+
+  struct State {
+    double period;
+    const JointLimits& limits;
+    const Eigen::VectorXd& velocity;
+    const Eigen::VectorXd* last_torque;
+    const BrakingTorque& dynamics;
+    bool mass_known;
+  };
+  /// Reads the bounds in the solution; writes torque, acceleration and active limits.
+  void apply(const State& state, TorqueSolution& solution) const noexcept;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "sidestep/constraints/acceleration_bounds.hpp"
+
+namespace sidestep {
+
+/// How a solve ended, from best to worst. The command is safe to send after every one of them.
+enum class TorqueStatus {
+  ok,                      ///< the wanted acceleration is tracked, no limit in the way
+  limited,                 ///< optimal within the limits, and at least one of them is in the way
+  relaxed,                 ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances,
+                           ///< position or torque limits
+  relaxed_safety,          ///< not all clearances, position limits and overruns can be kept (see safety, slack)
+  clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
+  fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
+  fallback_solver,         ///< the quadratic program could not be solved: damped stop
+};
+
+/// Which input is unusable.
+enum class TorqueFault { none, position, velocity, acceleration, mass_matrix, bias, clearances };
+
+/// Short names, for example "limited", "mass_matrix".
+const char* name(TorqueStatus status) noexcept;
+const char* name(TorqueFault fault) noexcept;
+
+/// What one solve did about one clearance.
+struct SafetyRow {
+  int coordinate;     ///< which clearance
+  int nearest;        ///< its nearest obstacle point
+  bool along_path;    ///< asks for a stop along the path: −|∇h| v/|v| stands for ∇h below (see clearance_constraints.hpp)
+  double required;    ///< smallest ∇h·q̈ [m/s²] that was asked for
+  double slack;       ///< by how much the solution falls short of it [m/s²]; 0 unless relaxed_safety
+  double multiplier;  ///< what the row costs the task, >= 0; the largest one dominates
+};
+
+/// What one solve gives. Made once, written by every solve.
+struct TorqueSolution {
+  explicit TorqueSolution(int num_coordinates, int max_safety_rows = 32);
+
+  TorqueStatus status = TorqueStatus::ok;
+  TorqueFault fault = TorqueFault::none;
+  Eigen::VectorXd torque;         ///< [Nm | N], within the effort limits, always finite
+  Eigen::VectorXd acceleration;   ///< M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable
+  Eigen::VectorXd slack;          ///< acceleration beyond its bounds [/s^2], signed; 0 unless relaxed
+  Eigen::VectorXd lower, upper;   ///< the acceleration bounds used [/s^2]; NaN if q or v is unusable
+  std::vector<Limit> active;      ///< the limits in the way of each joint
+  std::vector<SafetyRow> safety;  ///< the first num_safety_rows, most critical first
+  int num_safety_rows = 0;
+  int dominant = -1;         ///< the entry of `safety` that bends the motion most; -1 if none
+  int speed_frame = -1;      ///< the frame whose speed limit bends the motion most; -1: none
+  double speed_slack = 0.0;  ///< how far its row is missed [m/s²]; 0 unless limits of speed gave way
+  /// The least of all clearances given [m], exact, also without a row; inf: none.
+  double least_clearance = std::numeric_limits<double>::infinity();
+  int least_coordinate = -1, least_nearest = -1;  ///< which clearance that is, and its nearest point; -1: none
+};
+
+}  // namespace sidestep

@@ -1,0 +1,53 @@
+#pragma once
+
+#include "sidestep/constraints/hard_program.hpp"
+#include "sidestep/constraints/short_rows.hpp"
+
+namespace sidestep {
+
+/// The programs that find by how much rows of clearance have to fall short: the shortfalls r of which Σ w r² is least, with
+/// w = |∇h|²/(|∇h|² + ε²): first of those that are not violated yet, then of those that are, w times their depth over the largest.
+/// What pulls two ways is shared, and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is
+/// first widened by the least squares that do. So there always is a solution.
+class ShortfallProgram {
+ public:
+  ShortfallProgram(int num_coordinates, const std::vector<RowBlock>& blocks);
+
+  /// How a search ended: `any` is false where rows that never give way contradict each other.
+  struct Found {
+    bool any = true;
+    bool within_box = true;  ///< else the box was widened
+  };
+  /// Writes what is to be allowed, an acceleration that falls short by no more, and the multipliers.
+  Found solve(const TrackingCost& cost, Bounds& bounds, std::vector<RowBlock>& blocks, ShortRows& short_rows,
+              TorqueSolution& solution) noexcept;
+
+ private:
+  /// Over x = (q̈, r): the torque rows, normals q̈ + r >= required for up to `capacity` rows.
+  struct Program {
+    Program(int num_coordinates, int capacity, const std::vector<RowBlock>& blocks);
+    SpanCounter counter;
+    Span torque, short_rows;
+    std::vector<Span> never;
+    QuadraticProgramData data;
+    QuadraticProgram program;
+  };
+
+  void write(Program& program, const TrackingCost& cost, const Bounds& bounds, const std::vector<RowBlock>& blocks,
+             const ShortRows& short_rows, double deepest) noexcept;
+  /// of_lost: of the rows that are violated already, while the others keep what they have.
+  bool solve(Program& program, bool of_lost, const TrackingCost& cost, const Bounds& bounds, ShortRows& short_rows,
+             TorqueSolution& solution) noexcept;
+  bool widen(const TrackingCost& cost, const std::vector<RowBlock>& blocks, Bounds& bounds, TorqueSolution& solution) noexcept;
+
+  int nv_;
+  std::vector<Program> programs_;  // by number of rows, so that the usual few stay cheap
+  SpanCounter counter_;            // of the widening: over (q̈, what it is outside the box)
+  Span box_, torque_;
+  std::vector<Span> never_;
+  QuadraticProgramData widening_data_;
+  QuadraticProgram widening_;
+  Box everywhere_;  // without bounds
+};
+
+}  // namespace sidestep
