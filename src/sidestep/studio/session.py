@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 import time as clock
-from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,14 +29,25 @@ from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.seen_things import SeenThings
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
+from sidestep.studio.steps import Steps
 from sidestep.studio.systems import build_adapter, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 
 Array = npt.NDArray[np.float64]
 
-TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 LOOK_EVERY = 10  # steps between two looks for events
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
+
+
+class Aim(NamedTuple):
+    """Where the arm is to go: a pose (4, 4) or None, and the configuration, or one near that of the pose.
+
+    written: as the scenario says.
+    """
+
+    pose: Array | None
+    near: Array
+    written: bool
 
 
 class Session:
@@ -56,13 +67,12 @@ class Session:
         ValueError: that names what is wrong in the scenario, the method or its numbers.
 
     Attributes:
-        robot, tip: the arm and the link whose pose is a goal. stage: the physics.
+        robot: the arm. stage: the physics.
         period: of control [s]. time: simulated [s]. running: or paused.
         edition: grows when obstacles come or go, or a scenario is loaded.
     """
 
     robot: Robot
-    tip: str
     stage: SimulatedScene
     period: float
     time: float
@@ -70,13 +80,9 @@ class Session:
     edition: int
     _prepared: PreparedBodies
     _adapter: Adapter
-    _loaded_goal: tuple[Array | None, Array]
-    _goal: tuple[
-        Array | None, Array
-    ]  # a pose (4, 4) or None, and the configuration, or one near that of the pose
-    _goal_written: bool
-    _contacts: tuple[str, ...]
-    _times: deque[float]
+    _goal: Aim
+    _loaded_goal: Aim
+    _steps: Steps
     _rows: list[m.Row]
 
     def __init__(
@@ -91,7 +97,7 @@ class Session:
         draft: Draft | None = None,
         synchronous: bool = False,
     ) -> None:
-        self._prepare, self._draft = prepare, draft
+        self._new_bodies = partial(PreparedBodies, prepare, draft)
         self._usual_ellipsoids, self._synchronous = ellipsoids, synchronous
         self._turns = GoalsInTurn()
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
@@ -109,7 +115,7 @@ class Session:
                 self._turns.goals = ()
                 self._set_goal(None, self.robot.check_configuration(position, "goal"))
             case m.SetPoseGoal(pose, thorough):
-                last = None if self._goal[0] is None else self._adapter.posture
+                last = None if self._goal.pose is None else self._adapter.posture
                 near = self.stage.state()[0] if last is None else last.q
                 self._turns.goals = ()
                 self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
@@ -149,9 +155,10 @@ class Session:
             case m.Restart(until):
                 if self._turns.goals:
                     first = self._turns.goals[0]
-                    self._goal = None, first
-                    written, loaded = self._loaded_goal
-                    self._goal_written = written is None and np.array_equal(loaded, first)
+                    loaded = self._loaded_goal
+                    self._goal = Aim(
+                        None, first, written=loaded.pose is None and np.array_equal(loaded.near, first)
+                    )
                 self._use(self._method, self._numbers[self._method.name])  # remembers nothing
                 self._begin()
                 self.running, self._until = until > 0.0, until
@@ -163,7 +170,7 @@ class Session:
                 return
         if not self.running:
             self._adapter.look(*self.stage.state(), self._obstacles())
-            self._contacts = self.stage.contacts()
+            self._steps.contacts = self.stage.contacts()
 
     def step(self) -> None:
         """One control period: obstacles, state, torque, physics.
@@ -173,23 +180,23 @@ class Session:
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
-        self._torque = self._adapter.step(q, v, *stage.dynamics(), self._obstacles())
-        finite = stage.end(self._torque)
-        self._times.append(clock.perf_counter() - begin)
+        self._steps.torque = self._adapter.step(q, v, *stage.dynamics(), self._obstacles())
+        finite = stage.end(self._steps.torque)
+        self._steps.times.append(clock.perf_counter() - begin)
         if not finite:
             raise RuntimeError(f"the physics diverged at {self.time:.3f} s; restart")
         self.time += self.period
-        self._count += 1
-        if self._count % LOOK_EVERY == 0:
+        self._steps.count += 1
+        if self._steps.count % LOOK_EVERY == 0:
             self._look_back(q)
         if self.time >= self._until - 0.5 * self.period:
             self.running = False
         if stage.data.ncon:
-            self._contacts = stage.contacts()
-            self._touched += bool(self._contacts)
+            self._steps.contacts = stage.contacts()
+            self._steps.touched += bool(self._steps.contacts)
         else:
-            self._contacts = ()
-        if self._recording and self._count % RECORD_EVERY == 0:
+            self._steps.contacts = ()
+        if self._recording and self._steps.count % RECORD_EVERY == 0:
             self._rows.append(m.Row(self.time, q, self._seen.things, self._poses(), self._adapter.metric))
 
     def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
@@ -199,7 +206,7 @@ class Session:
         rows, self._rows = tuple(self._rows), []
         record = self._adapter.record() or StepRecord("at the start", metric=np.eye(len(q)))
         words = re.sub(r"\blink (?=\S*link)", "", record.words)  # such names say it themselves
-        pose, near = self._goal
+        goal = self._goal
         return m.Snapshot(
             scenario=self.scenario,
             edition=self.edition,
@@ -207,10 +214,10 @@ class Session:
             running=self.running,
             q=q.copy(),
             v=v.copy(),
-            goal=near if pose is None else None,
-            goal_pose=pose,
+            goal=goal.near if goal.pose is None else None,
+            goal_pose=goal.pose,
             posture=self._adapter.posture,
-            goal_written=self._goal_written,
+            goal_written=goal.written,
             draft=self._prepared.is_draft,
             refining=self._prepared.refining,
             visited=self._turns.goals,
@@ -223,14 +230,19 @@ class Session:
             numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
             **vars(record) | {"words": words},
             events=self._events.told,
-            torque_share=float((np.abs(self._torque) / limits.effort).max()),
+            torque_share=float((np.abs(self._steps.torque) / limits.effort).max()),
             speed_share=float((np.abs(v) / limits.velocity).max()),
-            contacts=self._contacts,
-            touched=self._touched,
-            timing=m.Timing.of(self._times, real_time),
+            contacts=self._steps.contacts,
+            touched=self._steps.touched,
+            timing=m.Timing.of(self._steps.times, real_time),
             recording=self._recording,
             rows=rows,
         )
+
+    @property
+    def tip(self) -> str:
+        """The link whose pose is a goal."""
+        return tip_of(self.robot)
 
     def actor(self, name: str) -> MovableObstacle:
         """The obstacle called `name`; raises ValueError that lists them."""
@@ -250,7 +262,7 @@ class Session:
         goals: Sequence[Array],
     ) -> None:
         robot = load_robot(scenario)
-        prepared = PreparedBodies(self._prepare, self._draft)
+        prepared = self._new_bodies()
         if self.edition and robot.fingerprint == self.robot.fingerprint:
             robot, prepared = self.robot, self._prepared
         start = coordinates(scenario.start, robot, "start.position")
@@ -265,11 +277,11 @@ class Session:
         numbers = self._numbers_for(scenario, given)
         adapter = self._adapter_of(method, numbers[method.name], scenario, robot, prepared)
         adapter.set_goal(pose, near, thorough=True)
-        self._adapter, self._goal, self._goal_written = adapter, (pose, near), True
-        self._turns.goals, self._loaded_goal = visited, (pose, near)
+        self._adapter, self._turns.goals = adapter, visited
+        self._goal = self._loaded_goal = Aim(pose, near, written=True)
         if self.edition and robot is not self.robot:
             self.stop()
-        self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
+        self.scenario, self.robot, self.stage = scenario, robot, stage
         self._method, self._numbers, self._prepared = method, numbers, prepared
         self.period = scenario.simulation.period
         self._start = start, velocity
@@ -288,11 +300,8 @@ class Session:
         return numbers
 
     def _begin(self) -> None:
-        self.time, self._count, self._touched = 0.0, 0, 0
+        self.time, self._steps = 0.0, Steps(np.zeros(self.robot.num_coordinates))
         self.running, self._until = True, float("inf")
-        self._contacts = ()
-        self._torque = np.zeros(self.robot.num_coordinates)
-        self._times = deque(maxlen=TIMED_STEPS)
         self._events = Events()
         self._turns.begin(0.0)
         self._recording = False  # time goes back: a recording is of one motion
@@ -303,7 +312,7 @@ class Session:
         """Several goals in turn, beginning with the one that comes after the present one, if it is among them."""
         self._turns.set(tuple(self.robot.check_configuration(q, "goals") for q in goals), self.time)
         if self._turns.goals:
-            self._set_goal(None, self._turns.after(self._goal[1]))
+            self._set_goal(None, self._turns.after(self._goal.near))
 
     def _look_back(self, q: Array) -> None:
         """Events of the last step, a finer body, and the next goal where the arm has been at this one for a while."""
@@ -312,13 +321,13 @@ class Session:
         moment = self._adapter.event_record()
         if moment is not None:
             self._events.take(self.time, moment)
-        following = self._turns.due(self.time, q, self._goal[1])
+        following = self._turns.due(self.time, q, self._goal.near)
         if following is not None:
             self._set_goal(None, following)
 
     def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
         self._adapter.set_goal(pose, q, thorough=thorough)
-        self._goal, self._goal_written = (pose, q), False
+        self._goal = Aim(pose, q, written=False)
         self._events.tell(self.time, "new goal")
 
     def _set_actors(self, actors: list[MovableObstacle]) -> None:
@@ -328,12 +337,12 @@ class Session:
 
     def _use(self, method: Method, numbers: Numbers) -> None:
         adapter = self._adapter_of(method, numbers, self.scenario, self.robot, self._prepared)
-        (pose, near), found = self._goal, self._adapter.posture
-        if pose is not None and found is not None and found.found:
-            near = found.q
-        adapter.set_goal(pose, near, thorough=True)
+        goal, found = self._goal, self._adapter.posture
+        if goal.pose is not None and found is not None and found.found:
+            goal = goal._replace(near=found.q)
+        adapter.set_goal(goal.pose, goal.near, thorough=True)
         self._adapter, self._method, self._numbers[method.name] = adapter, method, dict(numbers)
-        self._goal = pose, near
+        self._goal = goal
         self._look()
 
     def _adapter_of(
