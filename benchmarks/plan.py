@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import sidestep as ss
+from sidestep._core import PlanStatus
 from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.bench.arm import load_robot
 from sidestep.bench.motion_bench_maker import read_motion_bench_maker
@@ -26,7 +27,7 @@ from sidestep.bench.parallel import cpu_name
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.obstacles import obstacles_from_shapes
-from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
+from sidestep.planning import PathPlanner, PlannerSettings
 
 
 @dataclass(frozen=True)

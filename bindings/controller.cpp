@@ -184,15 +184,13 @@ void bind_command(nb::module_& m) {
       .def_ro("speed", &Command::speed, "Of the arm's fastest frame [m/s]; nan: unknown.")
       .def_ro("speed_limit", &Command::speed_limit, "For every frame [m/s]; inf: none; nan: unknown.")
       .def_ro("limits", &Command::limits, "(nv) the limits in the way of each joint.")
-      .def_ro("system", &Command::system, "StepStatus of the geometric system.")
-      .def_ro("program", &Command::program, "TorqueStatus of the quadratic program.")
       .def_ro("avoiding", &Command::avoiding, "Follows a trajectory out of the way of what moves.")
       .def_ro("on_path", &Command::on_path, "Follows a path of the planner.")
-      .def_ro("look_ahead_age", &Command::look_ahead_age,
+      .def_prop_ro("look_ahead_age", [](const Command& c) { return c.background.look_ahead_age; },
               "Time since the state from which the newest look-ahead that is followed was computed [s]: it grows where threads get too\n"
               "little processor time, or steps come faster than real time. 0: the part is off, or runs inside `step`.")
-      .def_ro("planner_age", &Command::planner_age, "The same of the planner's newest look [s]; 0 also where there is nothing to plan.")
-      .def_ro("pace", &Command::pace,
+      .def_prop_ro("planner_age", [](const Command& c) { return c.background.planner_age; }, "The same of the planner's newest look [s]; 0 also where there is nothing to plan.")
+      .def_prop_ro("pace", [](const Command& c) { return c.background.pace; },
               "Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`\n"
               "delays, then linear, 0 from `look_ahead.rest_after` delays on.")
       .def("__getstate__",
@@ -459,7 +457,7 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro(
           "geometric_step",
           of_last_step([](const Controller& self) {
-            return Step{self.command().system, self.workspace(),
+            return Step{self.attraction_status(), self.workspace(),
                         Explanation(self.system(), self.system().diagnose(self.workspace()), self.obstacles())};
           }),
           "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")

@@ -13,7 +13,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
+from sidestep._core import PlanStatus
+from sidestep.planning import PathPlanner, PlannerSettings
 from sidestep.system import GeometricSystem
 from support import planar_problems
 

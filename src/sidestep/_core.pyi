@@ -337,29 +337,6 @@ class Embedding:
         d2psi/dq2, (nv, nv) where m = 1, else (m, nv, nv); exact. For tests and plots, not for the loop.
         """
 
-class CollisionDensity(Embedding):
-    """
-    The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),
-        psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].
-    `average` divides by the number of points. Links that no joint moves are left out.
-    """
-
-    def __init__(self, robot: Robot, body: Body, *, average: bool = False) -> None: ...
-
-    operations_per_pair: Final[int] = ...
-    """
-    Multiplications and additions for a Gaussian and a point at rest without radius.
-    """
-
-class JointLimitPotential(Embedding):
-    """
-    Smooth steps at the joint limits (Bosc 2024, T5.7, corrected to a sum over the joints),
-        zeta(q) = height sum_j [s(slope (q_j - upper_j)) + s(slope (lower_j - q_j))],  s(u) = 1/(1 + exp(-u)).
-    slope [1/rad]; height in the unit of the coordinate it is added to.
-    """
-
-    def __init__(self, robot: Robot, *, slope: float = 30.0, height: float = 1.0) -> None: ...
-
 class ClearanceBarrier(Embedding):
     """
     One coordinate per covering ellipsoid of the body, a barrier of its clearance h_k to the obstacles,
@@ -455,13 +432,6 @@ class PlaneBarrier(Embedding):
     """
 
     def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
-
-class Sum(Embedding):
-    """
-    Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).
-    """
-
-    def __init__(self, terms: Sequence[Embedding]) -> None: ...
 
 def metric_matrix(jacobian: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """Metric G = I + J^T J (nv, nv) of the graph, from J (m, nv) (T2.9)."""
@@ -980,7 +950,7 @@ class AvoidanceTrajectory:
     """
     A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its
     limits allow, and the acceleration that follows it. It ignores obstacles: the acceleration is for an
-    AccelerationFilter or a TorqueController with clearances. Raises ValueError on wrong shapes and what is
+    MotionProgram with clearances. Raises ValueError on wrong shapes and what is
     not finite.
     """
 
@@ -1011,7 +981,7 @@ class AvoidanceTrajectory:
 class LookAhead:
     """
     Leads an arm out of the way of what moves, in time, where a barrier would back off along the line of
-    approach until a joint limit stops the arm. A look integrates the system, as an AccelerationFilter lets
+    approach until a joint limit stops the arm. A look integrates the system, as a MotionProgram lets
     it, with the obstacles moving on as they do; where that comes nearer to them than `clearance` [m] within
     `horizon` [s], it looks for an AvoidanceTrajectory to one of `tries` random configurations that does not,
     to be followed until the way to the goal is free. One thread at a time. period [s]: of the steps looked
@@ -1041,62 +1011,6 @@ class LookAhead:
     @property
     def count(self) -> int:
         """How many trajectories were found."""
-
-class Integrator(enum.Enum):
-    """How a step of length dt is taken."""
-
-    semi_implicit_euler = 0
-    """v += a dt; q += v dt."""
-
-    second_order = 1
-    """q += v dt + a dt^2/2; v += a dt (thesis 6.2.1)."""
-
-    runge_kutta_4 = 2
-    """The classical scheme, with the obstacles moved along."""
-
-class Rollout:
-    """A kinematic motion: row k is at time k dt, steps + 1 rows."""
-
-    @property
-    def time(self) -> numpy.typing.NDArray[numpy.float64]:
-        """[s]"""
-
-    @property
-    def statuses(self) -> list[StepStatus]:
-        """One StepStatus per row."""
-
-    @property
-    def step_seconds(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.
-        """
-
-    @property
-    def q(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(steps + 1, nv) [rad]"""
-
-    @property
-    def v(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(steps + 1, nv) [rad/s]"""
-
-    @property
-    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(steps + 1, nv) [rad/s^2]"""
-
-    @property
-    def values(self) -> numpy.typing.NDArray[numpy.float64]:
-        """psi (steps + 1, m)"""
-
-    @property
-    def switch(self) -> numpy.typing.NDArray[numpy.float64]:
-        """Weights of the harmonic part (steps + 1, nv)"""
-
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout:
-    """
-    Integrates the system alone from q, v (nv,) towards a goal, obstacles and goal moving at their velocities; nothing holds
-    limits or clearances: what has to keep them is a Controller, see `integrate`.
-    period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.
-    """
 
 class QuadraticProgramStatus(enum.Enum):
     """How a quadratic program ended."""
@@ -1483,17 +1397,18 @@ class TorqueSolution:
     def least_nearest(self) -> int:
         """Its nearest obstacle point; -1 if there is none."""
 
-class TorqueController:
+class MotionProgram:
     """
-    Torque that tracks a wanted acceleration within every limit of the arm:
-    minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to
+    The acceleration, and the torque for it, nearest to a wanted one within every limit of the arm and its
+    clearances: minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to
     M x + h = torque, |torque| <= effort limit, lower(q, v) <= x <= upper(q, v).
     Source: Bosc, equation T6.3, corrected. One object per thread.
     """
 
-    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings | None = None) -> None:
+    def __init__(self, robot: Robot, *, period: float = 0.001, by_torque: bool = True, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings | None = None) -> None:
         """
-        period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
+        period [s]: time between two steps; by_torque: whether the arm is moved by torque: otherwise velocity and
+        acceleration limits never give way, and no effort is limited; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
         torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the
         steepest tracking cost; velocity_overrun, acceleration_overrun [-], >= 1: the factor up to which those limits
         give way to clearances and torque limits;
@@ -1502,45 +1417,13 @@ class TorqueController:
         safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
         """
 
-    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None, last_acceleration: numpy.typing.ArrayLike | None = None, last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution:
+    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, clearances: Clearances | Step | None = None, last_acceleration: numpy.typing.ArrayLike | None = None, last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution:
         """
         One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),
-        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. With the last
-        period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits. Returns a
-        TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
-        """
-
-    @property
-    def num_coordinates(self) -> int:
-        """Number of joint coordinates nv."""
-
-    @property
-    def program(self) -> QuadraticProgramData:
-        """
-        The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];
-        rows without bounds are left out.
-        """
-
-    def count(self, status: TorqueStatus) -> int:
-        """Number of solves that ended with this status."""
-
-class AccelerationFilter:
-    """
-    The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:
-    TorqueController with unit masses and unlimited effort. Position, velocity and acceleration limits are never
-    left; only clearances can give way (status relaxed_safety). One object per thread.
-    """
-
-    def __init__(self, robot: Robot, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, safety: SafetySettings | None = None) -> None:
-        """
-        period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop
-        for unusable input; safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
-        """
-
-    def apply(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:
-        """
-        q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], clearances at (q, v), which a Step has.
-        Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.
+        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity; both only if by_torque), clearances at (q, v), which a Step
+        has. With the last period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits.
+        Returns a TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on
+        wrong shapes.
         """
 
     @property
@@ -1548,18 +1431,22 @@ class AccelerationFilter:
         """[s] between two calls."""
 
     @property
+    def by_torque(self) -> bool:
+        """Whether the arm is moved by torque."""
+
+    @property
     def num_coordinates(self) -> int:
         """Number of joint coordinates nv."""
 
     @property
     def program(self) -> QuadraticProgramData:
         """
-        The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];
-        rows without bounds are left out.
+        The first quadratic program of the last call that had usable input, over the acceleration
+        [rad/s^2 | m/s^2]; rows without bounds are left out.
         """
 
     def count(self, status: TorqueStatus) -> int:
-        """Number of calls that ended with this status."""
+        """Number of solves that ended with this status."""
 
 def integrate_batch(controllers: Sequence[Controller], q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goals: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0, threads: int = 0) -> list[MotionRecord]:
     """
@@ -1567,12 +1454,6 @@ def integrate_batch(controllers: Sequence[Controller], q: numpy.typing.ArrayLike
     several threads (0: one per processor). Each ends when every joint is within tolerance [rad | m] of its row of goals
     (N, nv), if given. Releases the GIL. Raises ValueError as `integrate` does, on a controller that is there twice and records
     of more than 8 GiB, RuntimeError while a controller is in use.
-    """
-
-def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', threads: int = 0) -> list[Rollout]:
-    """
-    The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads
-    (0: one per processor). Raises ValueError on wrong shapes.
     """
 
 class PlanStatus(enum.Enum):
@@ -3342,14 +3223,6 @@ class Command:
         """(nv) the limits in the way of each joint."""
 
     @property
-    def system(self) -> StepStatus:
-        """StepStatus of the geometric system."""
-
-    @property
-    def program(self) -> TorqueStatus:
-        """TorqueStatus of the quadratic program."""
-
-    @property
     def avoiding(self) -> bool:
         """Follows a trajectory out of the way of what moves."""
 
@@ -3685,5 +3558,97 @@ class RealTimeRecord:
         """Whether real-time scheduling was granted."""
 
     def __repr__(self) -> str: ...
+
+class CollisionDensity(Embedding):
+    """
+    The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),
+        psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].
+    `average` divides by the number of points. Links that no joint moves are left out.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, average: bool = False) -> None: ...
+
+    operations_per_pair: Final[int] = ...
+    """
+    Multiplications and additions for a Gaussian and a point at rest without radius.
+    """
+
+class JointLimitPotential(Embedding):
+    """
+    Smooth steps at the joint limits (Bosc 2024, T5.7, corrected to a sum over the joints),
+        zeta(q) = height sum_j [s(slope (q_j - upper_j)) + s(slope (lower_j - q_j))],  s(u) = 1/(1 + exp(-u)).
+    slope [1/rad]; height in the unit of the coordinate it is added to.
+    """
+
+    def __init__(self, robot: Robot, *, slope: float = 30.0, height: float = 1.0) -> None: ...
+
+class Sum(Embedding):
+    """
+    Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).
+    """
+
+    def __init__(self, terms: Sequence[Embedding]) -> None: ...
+
+class Integrator(enum.Enum):
+    """How a step of length dt is taken."""
+
+    semi_implicit_euler = 0
+    """v += a dt; q += v dt."""
+
+    second_order = 1
+    """q += v dt + a dt^2/2; v += a dt (thesis 6.2.1)."""
+
+    runge_kutta_4 = 2
+    """The classical scheme, with the obstacles moved along."""
+
+class Rollout:
+    """A kinematic motion: row k is at time k dt, steps + 1 rows."""
+
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """[s]"""
+
+    @property
+    def statuses(self) -> list[StepStatus]:
+        """One StepStatus per row."""
+
+    @property
+    def step_seconds(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.
+        """
+
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad]"""
+
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad/s]"""
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad/s^2]"""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """psi (steps + 1, m)"""
+
+    @property
+    def switch(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Weights of the harmonic part (steps + 1, nv)"""
+
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout:
+    """
+    Integrates the system alone from q, v (nv,) towards a goal, obstacles and goal moving at their velocities; nothing holds
+    limits or clearances: what has to keep them is a Controller, see `integrate`.
+    period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.
+    """
+
+def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', threads: int = 0) -> list[Rollout]:
+    """
+    The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads
+    (0: one per processor). Raises ValueError on wrong shapes.
+    """
 
 __version__: str

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep.system import StepStatus
+from sidestep._core import StepStatus
 
 # Of the hand, from where nothing of the arm itself is in a ball's way.
 FREE_SIDES = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]

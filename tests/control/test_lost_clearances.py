@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep.control import Clearances, MotionProgram, TorqueStatus
+from sidestep._core import TorqueStatus
+from sidestep.control import Clearances, MotionProgram
 
 PERIOD = 0.001
 FOLDED = {  # of a UR10, two links 15 cm inside each other

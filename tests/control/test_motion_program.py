@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep.control import AccelerationFilter, Limit, MotionProgram, TorqueController, TorqueStatus
+from sidestep._core import TorqueStatus
+from sidestep.control import AccelerationFilter, Limit, MotionProgram, TorqueController
 
 ROBOTS = ["fr3", "panda", "ur5", "planar2"]
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sidestep.control import QuadraticProgram, QuadraticProgramStatus
+from sidestep._core import QuadraticProgramStatus
+from sidestep.control import QuadraticProgram
 
 quadprog = pytest.importorskip("quadprog")
 

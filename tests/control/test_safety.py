@@ -7,7 +7,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
-from sidestep.control import Clearances, MotionProgram, SafetySettings, TorqueStatus
+from sidestep._core import TorqueStatus
+from sidestep.control import Clearances, MotionProgram, SafetySettings
 from sidestep.system import GeometricSystem
 
 MARGIN = SafetySettings().margin

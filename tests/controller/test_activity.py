@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep._core import PlanStatus
 from sidestep.obstacles import pose_at
-from sidestep.planning import PlanStatus
 
 PERIOD = 0.001  # [s] the default
 SETTLED = 0.5  # [s] after which even a search that finds nothing counts

@@ -7,8 +7,9 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
+from sidestep._core import PlanStatus
 from sidestep.controller import BarrierSettings, OnlinePlannerSettings
-from sidestep.planning import PlannerSettings, PlanStatus
+from sidestep.planning import PlannerSettings
 
 PERIOD = 0.005
 START, GOAL, REST = np.array([0.8, 0.0, 0.0]), np.array([-0.8, 0.0, 0.0]), np.zeros(3)

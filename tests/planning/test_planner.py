@@ -13,8 +13,9 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
+from sidestep._core import PlanStatus
 from sidestep.arm.clearance_tables import clearance_tables
-from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
+from sidestep.planning import PathPlanner, PlannerSettings
 from sidestep.system import ClearanceTable
 from support.planar_problems import BODY, balls, free_ends
 

@@ -4,7 +4,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.system import GeometricSystem, StepStatus
+from sidestep._core import StepStatus
+from sidestep.system import GeometricSystem
 
 
 def pose_goal(robot: ss.Robot) -> ss.PoseGoal:

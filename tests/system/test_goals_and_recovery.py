@@ -5,16 +5,9 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.controller import MotionState
+from sidestep._core import MotionState, StepStatus
 from sidestep.obstacles import pose_at
-from sidestep.system import (
-    ClearanceBarrier,
-    CoordinateKind,
-    GeometricSystem,
-    JointLimitBarrier,
-    StepStatus,
-    is_fallback,
-)
+from sidestep.system import ClearanceBarrier, CoordinateKind, GeometricSystem, JointLimitBarrier, is_fallback
 
 
 @pytest.fixture(scope="module")

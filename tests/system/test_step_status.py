@@ -5,7 +5,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.system import GeometricSystem, StepStatus, is_fallback
+from sidestep._core import StepStatus
+from sidestep.system import GeometricSystem, is_fallback
 from support.random_scene import scene
 
 RATE = 10.0  # [1/s] of the fallback

@@ -7,7 +7,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.system import Embedding, GeometricSystem, StepStatus
+from sidestep._core import StepStatus
+from sidestep.system import Embedding, GeometricSystem
 from support.random_scene import ROBOTS, Scene, State, scene
 
 STIFFNESS, DAMPING = 2.0, 1.2

@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 
 import sidestep as ss
 from sidestep import thesis
-from sidestep.system import GeometricSystem, StepStatus
+from sidestep._core import StepStatus
+from sidestep.system import GeometricSystem
 
 ROBOTS = ["planar2", "planar3", "ur5", "fr3"]
 

@@ -32,8 +32,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
       reference_(model.arm.num_coordinates()),
       last_(model.arm.num_coordinates()),
       state_(model.arm.num_coordinates()),
-      command_(c),
-      unknown_(Eigen::VectorXd::Constant(model.arm.num_coordinates(), std::numeric_limits<double>::quiet_NaN())) {
+      command_(c) {
   if (works && !model.settings.synchronous) {
     worker_.start(inputs_.goal(), look_ahead_);
   }

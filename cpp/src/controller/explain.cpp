@@ -10,11 +10,11 @@
 namespace sidestep {
 namespace {
 
-std::string explain_stop(const Command& command, const MeasuredState& arm, const Plausibility& plausible, TorqueFault fault) {
+std::string explain_stop(TorqueStatus program, const MeasuredState& arm, const Plausibility& plausible, TorqueFault fault) {
   if (arm.what_is_impossible().joint >= 0) {
     return "braking to a stop: " + plausible.describe(arm.what_is_impossible());
   }
-  if (command.program == TorqueStatus::fallback_solver) {
+  if (program == TorqueStatus::fallback_solver) {
     return "braking to a stop: the program was not solved";
   }
   return std::string("braking to a stop: the ") + (fault == TorqueFault::none ? "state" : name(fault)) +
@@ -70,7 +70,7 @@ std::string Controller::Impl::explain_motion() const {
     return "no step was made yet: call step with the measured state, once a period";
   }
   if (command_.status == SafetyStatus::stopping) {
-    return explain_stop(command_, measured_, model.plausible, solution_.fault);
+    return explain_stop(state_.program, measured_, model.plausible, solution_.fault);
   }
   std::string text;
   if (command_.status == SafetyStatus::clearance_lost && command_.coordinate >= 0) {
@@ -86,7 +86,7 @@ std::string Controller::Impl::explain_motion() const {
   text += explain_closing(sources_, attractor_.at_reference().clearances, model.clearances);
   text += speed_.explain(command_, solution_, obstacles());
   if (look_ahead_.slows(command_.activity == Activity::moving)) {
-    text += explain_age(look_ahead_.current_pace(), command_.look_ahead_age);
+    text += explain_age(look_ahead_.current_pace(), command_.background.look_ahead_age);
   }
   if (inputs_.request().trajectory() != nullptr && command_.activity != Activity::stale) {
     const bool keeps_path = inputs_.request().has_input() && inputs_.request().keeps_path();
@@ -103,7 +103,7 @@ std::string Controller::Impl::explain_motion() const {
 std::string Controller::Impl::explain_way() const {
   const GoalFollower& goal = inputs_.goal();
   const OnlinePlannerStatus planner_status = goal.planner_status();
-  if (command_.system == StepStatus::invalid_goal || command_.system == StepStatus::goal_outside_limits) {
+  if (state_.attraction == StepStatus::invalid_goal || state_.attraction == StepStatus::goal_outside_limits) {
     return "the goal has left the position limits: it is not followed; set a new goal";
   }
   if (inputs_.request().is_any() && !inputs_.request().moves() && !goal.is_led_to_target()) {

@@ -61,6 +61,7 @@ class Controller::Impl {
   Eigen::VectorXd target() const;
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
+  StepStatus attraction_status() const noexcept { return state_.attraction; }
   const TorqueSolution& solution() const noexcept { return solution_; }
 
   // Before the first step.
@@ -94,11 +95,13 @@ class Controller::Impl {
     explicit StepState(Eigen::Index nv);
 
     std::uint64_t tick = 0;
-    double time = 0.0, next_look = 0.0;  // [s]
-    bool apart = false;                  // the arm is not exactly where the reference is
-    const Goal* followed = nullptr;      // by which the reference is led
-    Eigen::VectorXd wanted, coupling;    // accelerations: after barriers, and to an arm that cannot follow
-    Places places;                       // where barriers leave room
+    double time = 0.0, next_look = 0.0;                           // [s]
+    bool apart = false;                                           // the arm is not exactly where the reference is
+    const Goal* followed = nullptr;                               // by which the reference is led
+    StepStatus attraction = StepStatus::invalid_state;            // how the attractor ended
+    TorqueStatus program = TorqueStatus::fallback_invalid_input;  // how the program ended
+    Eigen::VectorXd wanted, coupling;  // accelerations: after barriers, and to an arm that cannot follow
+    Places places;                     // where barriers leave room
   };
 
   // Parts of `step`, in its order.
@@ -107,7 +110,7 @@ class Controller::Impl {
   bool follow_arm() noexcept;
   void begin_motion() noexcept;
   /// Activation distances that leave room where the arm is led; `looks`: among what moves.
-  void leave_room(bool looks, const Obstacles& obstacles) noexcept;
+  void update_activation_distances(bool looks, const Obstacles& obstacles) noexcept;
   /// Out of the way of what moves, in place of what is followed; and the pace that the look-ahead leaves.
   void look_ahead(const Goal& followed, double time, const Obstacles& obstacles) noexcept;
   Lead lead(const Goal& followed, bool stale) const noexcept;
@@ -164,7 +167,6 @@ class Controller::Impl {
   StepState state_;
   Taken taken_;
   Command& command_;
-  const Eigen::VectorXd unknown_;  // a state that is none: not finite
 };
 
 template <class Action>

@@ -23,7 +23,7 @@ struct ControllerModel {
   const ControllerSettings settings;
   const bool torque;                                ///< it is what the arm is moved by
   const std::optional<RigidBodyDynamics> dynamics;  ///< with torque, where the arm has inertias
-  const ClearanceQuery body;                         ///< its items are those of the system's barriers
+  const ClearanceQuery body;                        ///< its items are those of the system's barriers
   const std::shared_ptr<const GeometricSystem> system;
   const Plausibility plausible;
   const JointKinds joints;

@@ -62,7 +62,7 @@ void Controller::Impl::report_stop() noexcept {
   command_.coordinate = command_.point = -1;
   command_.clearance = command_.distance = command_.speed = command_.speed_limit = unknown;
   command_.status = SafetyStatus::stopping;
-  command_.system = StepStatus::invalid_state;
+  state_.attraction = StepStatus::invalid_state;
   command_.activity = ActivityJudge::without_state(sources_.is_stale(), inputs_.request().is_any());
   if (tracker_.drives_track() && measured_.was_known()) {
     command_.velocity = reference_.next_v;
@@ -140,7 +140,7 @@ void Controller::Impl::report_clearance(bool apart) noexcept {
 }
 
 void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept {
-  SafetyStatus status = safety_of(command_.program);
+  SafetyStatus status = safety_of(state_.program);
   if (measured_.is_far_from_command()) {
     status = std::max(status, SafetyStatus::tracking_lost);
   }
@@ -148,7 +148,7 @@ void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept 
   if (stale) {
     status = std::max(status, SafetyStatus::stale);
   }
-  if (is_fallback(command_.system)) {
+  if (is_fallback(state_.attraction)) {
     status = SafetyStatus::stopping;
   }
   if (command_.clearance < 0.0) {
@@ -161,7 +161,7 @@ void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept 
     status = SafetyStatus::limited;
   }
   const ActivityJudge::Verdict verdict = activity_.judge({inputs_.request(), inputs_.destination(), inputs_.goal(), &followed,
-                                                          measured_, arm_state(apart), command_.system, state_.time, stale,
+                                                          measured_, arm_state(apart), state_.attraction, state_.time, stale,
                                                           inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
   command_.activity = verdict.activity;
   if (verdict.rests) {

@@ -38,22 +38,22 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (target.is_another_way) {
     activity_.forget(time);
   }
-  leave_room(looks, obstacles);
+  update_activation_distances(looks, obstacles);
   look_ahead(followed, time, obstacles);
 
   // Desired = attractor(Target, World)
-  command_.system =
+  state_.attraction =
       attractor_.attract(lead(followed, sources_.is_stale()), reference_, obstacles, sources_.closing(), state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
-  command_.program = guard(solve(state_.wanted, apart, followed, told));
+  state_.program = guard(solve(state_.wanted, apart, followed, told));
   reference_.advance(solution_.acceleration,
-                     command_.program == TorqueStatus::relaxed_safety || command_.program == TorqueStatus::clearance_lost,
+                     state_.program == TorqueStatus::relaxed_safety || state_.program == TorqueStatus::clearance_lost,
                      model.arm.robot().limits().jerk, settings.period);
 
   // Command = tracker(...)
-  command_.program = track(command_.program, apart, command_.tracking_error, told);
+  state_.program = track(state_.program, apart, command_.tracking_error, told);
   if (measured_.bridges_sample()) {  // what is reported is of the arm, as far as it is measured
     apart = attractor_.look_at_arm(measured_.sample_q(), measured_.sample_v(), obstacles) || apart;
     command_.tracking_error = (reference_.q - measured_.sample_q()).cwiseAbs().maxCoeff();
@@ -137,7 +137,7 @@ InputsStage::Moment Controller::Impl::moment(const NearReference& near) const no
           look_ahead_.is_followed()};
 }
 
-void Controller::Impl::leave_room(bool looks, const Obstacles& obstacles) noexcept {
+void Controller::Impl::update_activation_distances(bool looks, const Obstacles& obstacles) noexcept {
   GoalFollower& goal = inputs_.goal();
   if (looks) {
     sources_.look_for_movers(reference_.q);
@@ -191,9 +191,9 @@ void Controller::Impl::look_ahead(const Goal& followed, double time, const Obsta
     taken_.trajectory = look_ahead_.follow(time);
   }
   look_ahead_.judge_age(time, sources_.has_movers());
-  command_.planner_age = goal.planner_age(time);
-  command_.look_ahead_age = look_ahead_.age();
-  command_.pace = look_ahead_.current_pace();
+  command_.background.planner_age = goal.planner_age(time);
+  command_.background.look_ahead_age = look_ahead_.age();
+  command_.background.pace = look_ahead_.current_pace();
   if (look_ahead_.is_on() && !settings.speed_limits) {
     goal.limit_pace(look_ahead_.current_pace());
   }
@@ -288,14 +288,15 @@ const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const 
                                      LastCommand{&reference_.smooth_a}, tracker_.solution()));
     solution_.acceleration = tracker_.solution().acceleration;
     solution_.fault = q_known ? TorqueFault::velocity : TorqueFault::position;
-    command_.program = TorqueStatus::fallback_invalid_input;
+    state_.program = TorqueStatus::fallback_invalid_input;
     guard_.reset();
     reference_.advance(solution_.acceleration, false, model.arm.robot().limits().jerk, model.settings.period);
   } else {
+    const Eigen::VectorXd none;
     const bool is_impossible = measured_.what_is_impossible().joint >= 0;  // no number of it is used
     state_.wanted.setZero();
-    command_.program = program_.stop(is_impossible ? ConstVectorRef(unknown_) : q, is_impossible ? ConstVectorRef(unknown_) : v,
-                                     state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, solution_);
+    state_.program = program_.stop(is_impossible ? ConstVectorRef(none) : q, is_impossible ? ConstVectorRef(none) : v,
+                                   state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, solution_);
     tracker_.follow(solution_);
   }
   report_stop();

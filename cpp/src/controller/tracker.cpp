@@ -12,8 +12,8 @@ namespace sidestep {
 namespace {
 
 constexpr double close = 0.003;  // distance to the reference within which feedback keeps the acceleration limits [rad | m]
-constexpr double feedback_room = 20.0;  // factor on accelerations elsewhere: dry friction on a light wrist takes so much [-]
-constexpr double impedance_room =
+constexpr double feedback_factor = 20.0;  // factor on accelerations elsewhere: dry friction on a light wrist takes so much [-]
+constexpr double impedance_factor =
     1e3;  // factor on accelerations that an impedance asks for, of light joints and by impacts [-]
 constexpr double like_reference = 0.1;   // share of the acceleration limits by which feedback may differ [-]
 constexpr double of_rate = 0.5;          // share of the torque's rate that feedback asks for [-]
@@ -95,8 +95,8 @@ TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double t
   const Clearances* const clearances = as_reference ? nullptr : &arm.clearances;
   LastCommand last{&arm.last.acceleration};
   if (torque_) {
-    const double room = is_impedance() ? impedance_room : tracking_error < close ? 1.0 : feedback_room;
-    last = near_last(arm.last.acceleration, arm.last.has_torque ? &arm.last.torque : nullptr, arm.dynamics, room, false);
+    const double factor = is_impedance() ? impedance_factor : tracking_error < close ? 1.0 : feedback_factor;
+    last = near_last(arm.last.acceleration, arm.last.has_torque ? &arm.last.torque : nullptr, arm.dynamics, factor, false);
   }
   last.decided = &reference.a;
   const TorqueStatus status = program_.solve(arm.q, arm.v, feedback_, arm.dynamics, clearances, {}, last, solution_, arm.speed);

@@ -8,14 +8,11 @@ from sidestep._core import (
     MotionProgram,
     QuadraticProgram,
     QuadraticProgramData,
-    QuadraticProgramStatus,
     QuadraticSolution,
     Robot,
     SafetyRow,
     SafetySettings,
-    TorqueFault,
     TorqueSolution,
-    TorqueStatus,
     acceleration_bounds,
 )
 
@@ -26,14 +23,11 @@ __all__ = [
     "MotionProgram",
     "QuadraticProgram",
     "QuadraticProgramData",
-    "QuadraticProgramStatus",
     "QuadraticSolution",
     "SafetyRow",
     "SafetySettings",
     "TorqueController",
-    "TorqueFault",
     "TorqueSolution",
-    "TorqueStatus",
     "acceleration_bounds",
 ]
 

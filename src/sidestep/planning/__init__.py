@@ -3,22 +3,18 @@
 from sidestep._core import (
     Obstruction,
     OnlinePlanner,
-    OnlinePlannerStatus,
     PathPlanner,
     Plan,
     PlannerReference,
     PlannerSettings,
-    PlanStatus,
     TimedPathSettings,
 )
 
 __all__ = [
     "Obstruction",
     "OnlinePlanner",
-    "OnlinePlannerStatus",
     "PathPlanner",
     "Plan",
-    "PlanStatus",
     "PlannerReference",
     "PlannerSettings",
     "TimedPathSettings",

@@ -20,7 +20,6 @@ from sidestep._core import (
     PullForm,
     SelfCollisionBarrier,
     Step,
-    StepStatus,
     is_fallback,
 )
 
@@ -44,6 +43,5 @@ __all__ = [
     "PullForm",
     "SelfCollisionBarrier",
     "Step",
-    "StepStatus",
     "is_fallback",
 ]

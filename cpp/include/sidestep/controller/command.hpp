@@ -5,8 +5,6 @@
 #include <vector>
 
 #include "sidestep/constraints/acceleration_bounds.hpp"
-#include "sidestep/constraints/motion_solution.hpp"
-#include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep {
 
@@ -75,14 +73,15 @@ struct Command {
   double speed_limit = std::numeric_limits<double>::infinity();  ///< for every frame [m/s]; inf: none; NaN: unknown
   std::vector<Limit> limits;                                     ///< (nv) the limits in the way of each joint
 
-  StepStatus system = StepStatus::invalid_state;                ///< of the geometric system
-  TorqueStatus program = TorqueStatus::fallback_invalid_input;  ///< of the quadratic program
-  bool avoiding = false;                                        ///< follows an avoidance trajectory of the look-ahead
-  /// Time since the state from which the newest result that is followed was computed [s]: it grows where threads get too little
-  /// processor time, or steps come faster than real time. 0: the part is off, runs inside `step`, or has nothing to do.
-  double look_ahead_age = 0.0, planner_age = 0.0;
-  double pace = 1.0;     ///< share of its speed that the age of the look-ahead leaves the arm, see LookAheadSettings::pace
-  bool on_path = false;  ///< follows a path of the planner
+  bool avoiding = false;  ///< it follows an avoidance trajectory of the look-ahead
+  bool on_path = false;   ///< it follows a path of the planner
+  /// How old results of the threads beside the loop are.
+  struct Background {
+    /// Time since the state from which the newest result that is followed was computed [s]: it grows where threads get too little
+    /// processor time, or steps come faster than real time. 0: the part is off, runs inside `step`, or has nothing to do.
+    double look_ahead_age = 0.0, planner_age = 0.0;
+    double pace = 1.0;  ///< share of its speed that the age of the look-ahead leaves the arm, see LookAheadSettings::pace
+  } background;
 };
 
 /// Calls visit(name, field) for every field. A new field does not compile until it is named here.
@@ -90,7 +89,8 @@ template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
   auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
          tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit,
-         limits, system, program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
+         limits, avoiding, on_path, background] = command;
+  auto& [look_ahead_age, planner_age, pace] = background;
   visit("status", status);
   visit("activity", activity);
   visit("torque", torque);
@@ -113,8 +113,6 @@ void each_field(C& command, Visit&& visit) {
   visit("speed", speed);
   visit("speed_limit", speed_limit);
   visit("limits", limits);
-  visit("system", system);
-  visit("program", program);
   visit("avoiding", avoiding);
   visit("look_ahead_age", look_ahead_age);
   visit("planner_age", planner_age);

@@ -167,6 +167,8 @@ class Controller {
   const std::vector<CoordinateLabel>& labels() const noexcept;
   const GeometricSystem& system() const noexcept;
   const GeometricSystem::Workspace& workspace() const noexcept;
+  /// How the geometric system ended in the last step.
+  StepStatus attraction_status() const noexcept;
   /// The quadratic program's solution of the last step.
   const TorqueSolution& solution() const noexcept;
   /// The target configuration: the goal, or the posture of a pose goal; empty if none is known. Only for the thread of
