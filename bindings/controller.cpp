@@ -257,7 +257,7 @@ void warn_of_order(const Controller& controller) {
 template <class Get>
 auto of_last_step(Get get) {
   return [get](Controller& self) {
-    const Controller::Use use(self);
+    const Controller::ClaimedController use(self);
     return get(self);
   };
 }
@@ -417,7 +417,7 @@ void bind_controller(nb::module_& m) {
             if (mass_matrix.is_none() != bias.is_none()) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
             }
-            const Controller::Use use(self);
+            const Controller::ClaimedController use(self);
             Command command = mass_matrix.is_none() ? self.step(position, velocity)
                                                     : self.step(position, velocity, as_matrix(mass_matrix, "mass_matrix", nv, nv),
                                                                 as_vector(bias, "bias", nv));
@@ -436,7 +436,7 @@ void bind_controller(nb::module_& m) {
       .def(
           "record",
           [](Controller& self, const std::filesystem::path& path) {
-            const Controller::Use use(self);
+            const Controller::ClaimedController use(self);
             with_os_errors(path, [&] { self.record(path); });
             return RecordingInProgress{&self, path, {}};
           },
@@ -513,7 +513,7 @@ void bind_controller(nb::module_& m) {
         const int nv = controller.num_coordinates();
         const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
                               end = goal.is_none() ? Eigen::VectorXd() : as_vector(goal, "goal", nv);
-        const Controller::Use use(controller);
+        const Controller::ClaimedController use(controller);
         return interruptible([&](const Interrupted& interrupted) {
           return integrate(controller, position, velocity, steps, end, tolerance, interrupted);
         });

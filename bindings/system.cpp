@@ -144,8 +144,8 @@ void bind_step(nb::module_& m) {
                    "The push out of barriers (nv,) [rad/s^2]; zero outside.")
       .def_prop_ro("inside", [](const Step& s) { return s.result.inside; },
                    "The coordinate deepest below its barrier's floor; -1: none.")
-      .def_prop_ro("goal_gradient", [](const Step& s) { return to_numpy(s.result.pull.gradient); }, "dU/dq (nv,).")
-      .def_prop_ro("goal_potential", [](const Step& s) { return s.result.pull.potential; },
+      .def_prop_ro("goal_gradient", [](const Step& s) { return to_numpy(s.result.goal.gradient); }, "dU/dq (nv,).")
+      .def_prop_ro("goal_potential", [](const Step& s) { return s.result.goal.potential; },
                    "U [rad^2/s^2], without the posture pull.")
       .def_ro("diagnosis", &Step::explanation, "Why the motion is what it is.");
 }

@@ -134,10 +134,10 @@ void let_near_pairs_be(std::vector<LinkPair>& own, const Robot& larger, const Bo
   const ClearanceQuery clearance(larger, body, own);
   ClearanceQuery::Workspace w(clearance);
   Eigen::VectorXd gaps(clearance.num_items());
-  clearance.clearances(q, Obstacles::none(), attached_room, w, gaps);
+  clearance.clearances(q, Obstacles::none(), attached_distance, w, gaps);
   for (std::size_t k = 0; k < own.size(); ++k) {
     const auto item = clearance.num_items() - static_cast<Eigen::Index>(own.size()) + static_cast<Eigen::Index>(k);
-    own[k].contact = std::min(0.0, gaps[item] - attached_room);
+    own[k].contact = std::min(0.0, gaps[item] - attached_distance);
   }
 }
 

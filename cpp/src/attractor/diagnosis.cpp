@@ -100,17 +100,17 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   if (is_fallback(w.status_) || !has_goal) {
     return d;
   }
-  d.joint_error = w.pull.joint_error;
-  const int farthest = w.pull.farthest_coordinate();
+  d.joint_error = w.goal.joint_error;
+  const int farthest = w.goal.farthest_coordinate();
   d.prismatic = farthest >= 0 && robot_.is_prismatic(farthest);
-  d.position_error = w.pull.position_error;
-  d.rotation_error = w.pull.rotation_error;
+  d.position_error = w.goal.position_error;
+  d.rotation_error = w.goal.rotation_error;
 
   // b_k·b with b = ∂U − G⁻¹ ∂U and w.attraction = −G⁻¹ ∂U; G_S in place of G if the pull is one-sided.
-  const double pull = w.pull.gradient.norm();
+  const double desired = w.goal.gradient.norm();
   const double passed = w.attraction.norm();
-  const double held_back = (w.pull.gradient + w.attraction).squaredNorm();
-  d.blocked = pull > 0.0 ? 1.0 - passed / pull : 0.0;
+  const double held_back = (w.goal.gradient + w.attraction).squaredNorm();
+  d.blocked = desired > 0.0 ? 1.0 - passed / desired : 0.0;
   double largest = 0.0;
   for (Eigen::Index k = 0; k < w.values.size(); ++k) {
     if (w.values[k] == 0.0) {
@@ -120,7 +120,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
     if (settings_.pull_form == PullForm::one_sided && J.dot(w.attraction) <= 0.0) {
       continue;  // it holds nothing back
     }
-    const double part = -J.dot(w.attraction) * (J.dot(w.pull.gradient) + J.dot(w.attraction));
+    const double part = -J.dot(w.attraction) * (J.dot(w.goal.gradient) + J.dot(w.attraction));
     if (part > largest) {
       largest = part;
       d.coordinate = static_cast<int>(k);
@@ -134,7 +134,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
     d.share = 0.0;
   } else if (d.is_near()) {
     d.state = MotionState::arriving;
-  } else if (d.speed < judgement::slow && (d.blocked > 1.0 - judgement::held || pull < judgement::vanished)) {
+  } else if (d.speed < judgement::slow && (d.blocked > 1.0 - judgement::held || desired < judgement::vanished)) {
     d.state = MotionState::stuck;
   } else {
     d.state = d.blocked > judgement::noticed ? MotionState::sliding : MotionState::free;

@@ -125,7 +125,7 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       clearances(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       activations(system.activations()),
       metric(system.robot().num_coordinates(), system.num_embedding_coordinates()),
-      pull(system.robot().num_coordinates()),
+      goal(system.robot().num_coordinates()),
       state_(system.robot()),
       relative_velocity_(acceleration),
       distances_(acceleration),
@@ -155,22 +155,22 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v, const Goal&
   const GoalFault fault = check(goal, robot_);
   w.metric.update(w.jacobian_transposed);
   if (fault == GoalFault::invalid || fault == GoalFault::outside_limits) {
-    w.pull.release();  // barriers, damping and recovery go on without a pull: an arm without a goal still evades
+    w.goal.release();  // barriers, damping and recovery go on without a pull: an arm without a goal still evades
   } else {
-    w.pull.update(goal, w.state_, stiffness_);
+    w.goal.update(goal, w.state_, stiffness_);
   }
 
   // h = −G⁻¹ ∂U − D (v − v*), its first term perhaps one-sided, or with D (v − v*) under G⁻¹ too.
   const auto velocity = sized(v, nv);
   auto attraction = sized(w.attraction, nv), harmonic = sized(w.harmonic, nv), geodesic = sized(w.geodesic, nv);
-  attraction = -sized(w.pull.gradient, nv);
+  attraction = -sized(w.goal.gradient, nv);
   if (settings_.pull_form == PullForm::one_sided) {
     w.one_sided_.solve_in_place(w.jacobian_transposed, w.attraction);
   } else {
     w.metric.solve_in_place(w.attraction);
   }
   auto relative_velocity = sized(w.relative_velocity_, nv);
-  relative_velocity = velocity - sized(w.pull.velocity, nv);
+  relative_velocity = velocity - sized(w.goal.velocity, nv);
   damping_.multiply(relative_velocity, harmonic, nv);
   if (settings_.damping_form == DampingForm::metric) {
     w.metric.solve_in_place(w.harmonic);

@@ -194,13 +194,13 @@ GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   return check_pose(std::get<PoseGoal>(goal), robot);
 }
 
-GoalPull::GoalPull(int nv)
+GoalPotential::GoalPotential(int nv)
     : gradient(Eigen::VectorXd::Zero(nv)),
       velocity(gradient),
       displacement_(gradient),
       jacobian_transposed_(Eigen::MatrixXd::Zero(nv, 6)) {}
 
-void GoalPull::update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
+void GoalPotential::update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     update(*joint, state, stiffness);
   } else {
@@ -208,13 +208,13 @@ void GoalPull::update(const Goal& goal, const KinematicState& state, const Gain&
   }
 }
 
-void GoalPull::release() noexcept {
+void GoalPotential::release() noexcept {
   potential = joint_error = position_error = rotation_error = nan;
   gradient.setZero();
   velocity.setZero();
 }
 
-void GoalPull::update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
+void GoalPotential::update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
   with_size(gradient.size(), [&](auto nv) {
     auto displacement = sized(displacement_, nv), force = sized(gradient, nv);
     displacement = sized(state.q(), nv) - sized(goal.position, nv);
@@ -227,7 +227,7 @@ void GoalPull::update(const JointGoal& goal, const KinematicState& state, const 
   position_error = rotation_error = nan;
 }
 
-int GoalPull::farthest_coordinate() const noexcept {
+int GoalPotential::farthest_coordinate() const noexcept {
   Eigen::Index farthest = -1;
   if (!std::isnan(joint_error)) {
     displacement_.cwiseAbs().maxCoeff(&farthest);
@@ -235,7 +235,7 @@ int GoalPull::farthest_coordinate() const noexcept {
   return static_cast<int>(farthest);
 }
 
-void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcept {
+void GoalPotential::update(const PoseGoal& goal, const KinematicState& state) noexcept {
   potential = position_error = 0.0;
   joint_error = rotation_error = nan;
   gradient.setZero();
@@ -246,7 +246,7 @@ void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcep
   }
 }
 
-void GoalPull::add(const PoseGoal& goal, bool posture, const KinematicState& state) noexcept {
+void GoalPotential::add(const PoseGoal& goal, bool posture, const KinematicState& state) noexcept {
   const PoseGoalSettings& settings = goal.settings;
   const KinematicState::Link& link = state.link(goal.frame().joint);
   const Eigen::Matrix3d R = link.R_WL * goal.frame().X_JF.linear();

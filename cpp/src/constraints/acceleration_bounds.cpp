@@ -18,14 +18,14 @@ double speed_within(double distance, double c, double acceleration, double perio
   return std::max(start_speed + (distance - start) / ((n + 0.5 + c) * period), 0.0);
 }
 
-/// The largest next velocity that keeps the way `room` = (limit - q) to an upper position limit.
-double largest_next_velocity(double room, double v, double acceleration, double period) noexcept {
-  if (room == infinity) {
+/// The largest next velocity that keeps the way `distance_left` = (limit - q) to an upper position limit.
+double largest_next_velocity(double distance_left, double v, double acceleration, double period) noexcept {
+  if (distance_left == infinity) {
     return infinity;
   }
-  const bool braking = v * period + braking_distance(v, acceleration, period) > room;
+  const bool braking = v * period + braking_distance(v, acceleration, period) > distance_left;
   const double c = braking ? 0.5 : 1.0;
-  const double rest = room - (1.0 - c) * v * period;  // what is left for D(w) + c w T
+  const double rest = distance_left - (1.0 - c) * v * period;  // what is left for D(w) + c w T
   if (rest >= 0.0) {
     return speed_within(rest, c, acceleration, period);
   }
@@ -85,8 +85,8 @@ void widen(AccelerationInterval& interval, double q, double v, const ScalarLimit
   ScalarLimits wide = limits;
   wide.acceleration *= factor;
   const double A = limits.acceleration;
-  const auto by_limit = [&](double room, double speed) {
-    return (std::min(largest_next_velocity(room, speed, A, period), limits.velocity) - speed) / period;
+  const auto by_limit = [&](double distance_left, double speed) {
+    return (std::min(largest_next_velocity(distance_left, speed, A, period), limits.velocity) - speed) / period;
   };
   if (interval.upper_limit == Limit::acceleration_upper && interval.upper >= A) {
     interval.upper = std::max(interval.upper, std::min(wide.acceleration, by_limit(limits.upper - q, v)));
@@ -148,8 +148,8 @@ double jerk_braking_distance(double v, double a, double A, double J) noexcept {
   return from_rest(first) - time * (first + a * time / 6.0);
 }
 
-ReturnableAcceleration largest_returnable(double room, double speed, double least, double largest, const ScalarLimits& limits,
-                                          double jerk, double period) noexcept {
+ReturnableAcceleration largest_returnable(double distance_left, double speed, double least, double largest,
+                                          const ScalarLimits& limits, double jerk, double period) noexcept {
   ReturnableAcceleration found{largest};
   const double step = jerk * period, A = limits.acceleration, half = 0.5 * step;
   // v + xT <= V, or with y = x - JT/2 > 0:  v + JT²/2 + yT + y²/2J <= V
@@ -167,9 +167,9 @@ ReturnableAcceleration largest_returnable(double room, double speed, double leas
     const double fastest = then > 0.0 ? next + 0.5 * then * then / jerk : next;  // of the profile
     return (std::max(next, 0.5 * (next + speed)) + 0.5 * std::max(fastest, 0.0)) * period +
                jerk_braking_distance(next, then, A, jerk) <=
-           room;
+           distance_left;
   };
-  if (room < infinity && !fits(found.value)) {
+  if (distance_left < infinity && !fits(found.value)) {
     found.by_position = true;
     double low = least, high = found.value;
     constexpr int halvings = 24;
@@ -190,9 +190,9 @@ SmoothInterval smooth_interval(double q, double v, double before, const Accelera
     return smooth;
   }
   // Of a state that may be mirrored, towards an upper limit.
-  const auto viable_up_to = [&](double room, double speed, double least, double largest, Limit at_velocity, Limit at_position,
-                                Limit& limit) {
-    const ReturnableAcceleration found = largest_returnable(room, speed, least, largest, limits, jerk, period);
+  const auto viable_up_to = [&](double distance_left, double speed, double least, double largest, Limit at_velocity,
+                                Limit at_position, Limit& limit) {
+    const ReturnableAcceleration found = largest_returnable(distance_left, speed, least, largest, limits, jerk, period);
     limit = found.by_position ? at_position : found.by_velocity ? at_velocity : limit;
     return found.value;
   };

@@ -30,10 +30,10 @@ ClearanceConstraints::Closing ClearanceConstraints::closing_of(int row, const Cl
   const auto gradient = approach.gradients.col(k);
   const double by_torque = state.torque == nullptr ? infinity : braking_.hardest_by_torque(row, limits, *state.torque);
   const double by_limits = largest_product(gradient, -limits.acceleration, limits.acceleration);
-  const double room = room_of(clearances, k), u = -approach.rates[k];
+  const double distance_left = distance_left_of(clearances, k), u = -approach.rates[k];
   // Either alone may promise more than there is: torques that brake hardest may fling joints about. Where it may matter.
   double by_both = std::min(by_limits, by_torque);
-  const bool counts = state.torque != nullptr && u > 0.0 && u / stop.rate + 0.5 * u * u / (scarce * by_both) > room;
+  const bool counts = state.torque != nullptr && u > 0.0 && u / stop.rate + 0.5 * u * u / (scarce * by_both) > distance_left;
   if (counts) {
     by_both = std::min(by_both, braking_.largest_by_both(gradient, least_, limits.acceleration, by_both));
   }
@@ -42,23 +42,23 @@ ClearanceConstraints::Closing ClearanceConstraints::closing_of(int row, const Cl
                               settings_.correction};
   // Of the points, but no more than the mean where it says that a surface recedes: see the header.
   const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
-  required = demanded_deceleration(room, u, closing, state.period) - c;
+  required = demanded_deceleration(distance_left, u, closing, state.period) - c;
   double now = std::min(largest_product(gradient, state.bounds.lower, state.bounds.upper), by_torque);
   if (counts && required > 0.0) {
     now = std::min(now, braking_.largest_by_both(gradient, state.bounds.lower, state.bounds.upper, now));
   }
   const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
-  const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
-  return {room, u, c, -gradient.dot(state.v), hardest, now, lasts, net, closing};
+  const bool lasts = net > 0.0 && (u <= 0.0 || distance_left >= u * u / (2.0 * net));
+  return {distance_left, u, c, -gradient.dot(state.v), hardest, now, lasts, net, closing};
 }
 
 double ClearanceConstraints::without_excess(double required, const Closing& closing, int row, double period,
                                             PathStop& stop) const noexcept {
-  const auto& [room, u, c, of_arm, hardest, now, lasts, net, limits] = closing;
-  if (room > 0.0 && stop.tau > 0.0 && u <= of_arm + slow) {
+  const auto& [distance_left, u, c, of_arm, hardest, now, lasts, net, limits] = closing;
+  if (distance_left > 0.0 && stop.tau > 0.0 && u <= of_arm + slow) {
     const double share = of_arm / stop.tau;
     const double of_velocity = settings_.correction * stop.tau / period;  // that goes in this period
-    double hardness = std::min(hardness_of_stop(room, std::max(u, of_arm), c, stop.tau), of_velocity);
+    double hardness = std::min(hardness_of_stop(distance_left, std::max(u, of_arm), c, stop.tau), of_velocity);
     if (hardness <= 1.0) {
       return std::min(required, share);
     }
@@ -75,7 +75,7 @@ double ClearanceConstraints::without_excess(double required, const Closing& clos
   if (required > now && lasts) {
     return now;
   }
-  if (room <= 0.0 && required > now && net > 0.0) {
+  if (distance_left <= 0.0 && required > now && net > 0.0) {
     // Of what closes in, not of the way back.
     return std::min(required, std::max(now, settings_.correction * u / period - c));
   }
@@ -86,14 +86,14 @@ double ClearanceConstraints::with_jerk(double asked, const Closing& closing, int
                                        const BrakingState& state, PathStop& stop) noexcept {
   const LastMotion& last = *state.last;
   const double whole = last.jerk_share * gradient.cwiseAbs().dot(state.limits.jerk);
-  if (whole < infinity && (closing.room <= 0.0 || closing.u <= closing.of_arm + slow)) {
+  if (whole < infinity && (closing.distance_left <= 0.0 || closing.u <= closing.of_arm + slow)) {
     Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
-    const double jerk = closing.room > 0.0 ? last.jerk_share * closing.of_arm * stop.jerk : whole;
+    const double jerk = closing.distance_left > 0.0 ? last.jerk_share * closing.of_arm * stop.jerk : whole;
     reserve.hardest = stop.tau > 0.0 ? closing.of_arm / stop.tau : 0.0;
     reserve.jerk = of_jerk_alone * jerk;
     reserve.before = gradient.dot(last.acceleration);
   }
-  double required = smoothed(asked, closing.room, closing.u, closing.c, of_hardest * closing.hardest, gradient, last,
+  double required = smoothed(asked, closing.distance_left, closing.u, closing.c, of_hardest * closing.hardest, gradient, last,
                              state.bounds, state.limits, state.period);
   const bool smooth = required < asked;
   // What motors that change their torque no faster can do next: beyond it light joints would be flung about, and little else.
@@ -112,9 +112,9 @@ double ClearanceConstraints::within_rates(ConstVectorRef direction, double asked
                                                   rates.torque_lower, rates.torque_upper, asked));
 }
 
-double ClearanceConstraints::smoothed(double required, double room, double u, double c, double A, ConstVectorRef gradient,
-                                      const LastMotion& last, const AccelerationBounds& bounds, const JointLimits& limits,
-                                      double period) noexcept {
+double ClearanceConstraints::smoothed(double required, double distance_left, double u, double c, double A,
+                                      ConstVectorRef gradient, const LastMotion& last, const AccelerationBounds& bounds,
+                                      const JointLimits& limits, double period) noexcept {
   const double jerk = last.jerk_share * gradient.cwiseAbs().dot(limits.jerk);
   if (!(jerk < infinity)) {
     return required;
@@ -124,16 +124,18 @@ double ClearanceConstraints::smoothed(double required, double room, double u, do
   const double most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);  // joints at a limit give no more
   const auto raised = [&](double share) { return std::min(before + share * std::max(most - before, 0.0), most); };
   const double lasting = last.early ? std::min(c, 0.0) : c;
-  const auto stops = [&](double x, double share) { return smooth_stop_fits(room, u, x + lasting, A, share * jerk, period); };
+  const auto stops = [&](double x, double share) {
+    return smooth_stop_fits(distance_left, u, x + lasting, A, share * jerk, period);
+  };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
-  if (!last.lost && room <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
+  if (!last.lost && distance_left <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
     return std::min(required, alone);
   }
   const bool enough = stops(shared, of_jerk);
   if (required > shared) {
     return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
   }
-  if (!last.early || room <= 0.0) {
+  if (!last.early || distance_left <= 0.0) {
     return required;
   }
   const double part = enough ? of_jerk : of_jerk_alone;

@@ -132,9 +132,9 @@ void ClearanceConstraints::add(const Clearances& clearances, const BrakingState&
     double required = 0.0;
     const Closing closing = closing_of(row, clearances, state, stop, required);
     required = without_excess(required, closing, row, state.period, stop);
-    reserves_[at] = {closing.room, closing.u, closing.c};
+    reserves_[at] = {closing.distance_left, closing.u, closing.c};
     reserves_[at].limits = closing.limits;
-    reserves_[at].margin = approach.values[k] - closing.room;
+    reserves_[at].margin = approach.values[k] - closing.distance_left;
     reserves_[at].seen = clearances.margins[k] == infinity;
     if (state.last != nullptr) {
       required = with_jerk(required, closing, row, gradient, state, stop);
@@ -152,7 +152,7 @@ void ClearanceConstraints::add(const Clearances& clearances, const BrakingState&
   }
 }
 
-double ClearanceConstraints::room_of(const Clearances& clearances, Eigen::Index k) const noexcept {
+double ClearanceConstraints::distance_left_of(const Clearances& clearances, Eigen::Index k) const noexcept {
   return clearances.approach.values[k] - std::min(settings_.margin, clearances.margins[k]);
 }
 
@@ -167,12 +167,12 @@ void ClearanceConstraints::choose(const Clearances& clearances, const PathStop& 
     if (!(approach.gradients.col(k).norm() > shortest_gradient)) {
       const ClosingLimits none{smallest_deceleration, smallest_deceleration, stop.rate, settings_.correction};
       const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
-      if (demanded_deceleration(room_of(clearances, k), -approach.rates[k], none, period) > c) {
+      if (demanded_deceleration(distance_left_of(clearances, k), -approach.rates[k], none, period) > c) {
         rows.unreachable = true;
       }
       continue;
     }
-    const double urgency = room_of(clearances, k) + approach.rates[k] / stop.rate;
+    const double urgency = distance_left_of(clearances, k) + approach.rates[k] / stop.rate;
     if (rows.size == max_rows() && (rows.size == first || urgency >= urgency_[rows.size - 1])) {
       continue;
     }

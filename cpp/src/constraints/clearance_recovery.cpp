@@ -21,12 +21,12 @@ bool ClearanceConstraints::relax_to_braking(double period, RowBlock& rows) noexc
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
     const double asked = rows.lower[row] * rows.lengths[row];
     // Of what is known and not seen most of the margin is a reserve as well.
-    const double room = reserve.room + (reserve.seen ? 0.0 : (1.0 - of_margin) * reserve.margin);
+    const double distance_left = reserve.distance_left + (reserve.seen ? 0.0 : (1.0 - of_margin) * reserve.margin);
     const auto fits = [&](double x) {
       const double slowing = x + reserve.curvature;
-      return room > 0.0
-                 ? smooth_stop_fits(room, reserve.closing_speed, slowing, std::max(reserve.hardest, 0.0), reserve.jerk, period)
-                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
+      return distance_left > 0.0 ? smooth_stop_fits(distance_left, reserve.closing_speed, slowing,
+                                                    std::max(reserve.hardest, 0.0), reserve.jerk, period)
+                                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
     };
     asked_[row] = rows.lower[row];
     if (along_path_[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked)) {
@@ -44,12 +44,13 @@ void ClearanceConstraints::defer_recovery(double period, RowBlock& rows) noexcep
   int spare = rows.capacity() - rows.size;
   for (int row = 0; row < rows.size && spare > 0; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
-    if (along_path_[static_cast<std::size_t>(row)] != 0 || rows.depths[row] > 0.0 || reserve.seen || reserve.room > 0.0 ||
-        !opposes_lost(rows, row)) {
+    if (along_path_[static_cast<std::size_t>(row)] != 0 || rows.depths[row] > 0.0 || reserve.seen ||
+        reserve.distance_left > 0.0 || !opposes_lost(rows, row)) {
       continue;
     }
-    const double room = reserve.room + (1.0 - of_margin) * reserve.margin;
-    const double needed = demanded_deceleration(room, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
+    const double distance_left = reserve.distance_left + (1.0 - of_margin) * reserve.margin;
+    const double needed =
+        demanded_deceleration(distance_left, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
     if (needed / rows.lengths[row] < rows.lower[row]) {
       rows.lower[row] = needed / rows.lengths[row];
       --spare;
@@ -73,7 +74,7 @@ bool ClearanceConstraints::add_recovery(RowBlock& rows) noexcept {
   bool any = false;
   for (int row = 0, asked = rows.size; row < asked; ++row) {
     const auto at = static_cast<std::size_t>(row);
-    if (reserves_[at].room > 0.0 || rows.lower[row] >= asked_[row]) {
+    if (reserves_[at].distance_left > 0.0 || rows.lower[row] >= asked_[row]) {
       continue;
     }
     any = true;

@@ -44,7 +44,7 @@ void Controller::Impl::let_rest(const std::vector<RestingObject>& objects) {
     for (std::size_t k = 0; k < model.system->labels().size(); ++k) {
       const CoordinateLabel& label = model.system->labels()[k];
       if (label.kind == CoordinateLabel::Kind::obstacle && label.name == one.object.name) {
-        const double free = std::max(lifted_clearance, model.settings.safety.margin + attached_room);
+        const double free = std::max(lifted_clearance, model.settings.safety.margin + attached_distance);
         resting_.add({static_cast<Eigen::Index>(k), one.given[i++] + free});
       }
     }

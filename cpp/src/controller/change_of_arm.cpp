@@ -169,7 +169,7 @@ std::string Controller::attach(const Attachment& object) {
       holding = sidestep::attach(holding, one.object, one.q);
     }
     sidestep::attach(holding, object);  // for what is wrong with it
-    last.resting = resting(holding.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
+    last.resting = resting(holding.robot(), object, last.q, *around, settings_.safety.margin + attached_distance);
   }
   const Eigen::VectorXd q = last.q;
   change(whole_, std::move(held));

@@ -45,7 +45,7 @@ Controller::~Controller() {
   destroy(retired_.load());
 }
 
-Controller::Use::Use(Controller& controller) : controller_(&controller) {
+Controller::ClaimedController::ClaimedController(Controller& controller) : controller_(&controller) {
   if (controller.in_use_.exchange(true, std::memory_order_acquire)) {
     throw std::runtime_error(
         "the controller is in use: a RealTimeRun or another thread steps it; stop it first, or wait for its end");

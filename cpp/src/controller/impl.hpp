@@ -18,7 +18,7 @@
 #include "request_board.hpp"
 #include "resting_clearances.hpp"
 #include "sidestep/controller/controller.hpp"
-#include "../guard/failsafe.hpp"
+#include "../guard/backup_manoeuvre.hpp"
 #include "sources.hpp"
 #include "speed_limiter.hpp"
 #include "tracker.hpp"
@@ -116,7 +116,7 @@ class Controller::Impl {
   Lead lead(const Goal& followed, bool stale) const noexcept;
   /// The program's answer to the wanted acceleration, with the clearances of the arm where that is `apart`.
   TorqueStatus solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told) noexcept;
-  /// Lets the reference go on only to where it can stop, see Failsafe.
+  /// Lets the reference go on only to where it can stop, see BackupManoeuvre.
   TorqueStatus guard(TorqueStatus solved) noexcept;
   TorqueStatus track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told) noexcept;
   void tell_worker(const Goal& followed, double time, bool wakes) noexcept;
@@ -157,7 +157,7 @@ class Controller::Impl {
   SpeedLimiter speed_;
   JointProgram program_;
   TorqueSolution solution_;  // of the reference
-  Failsafe guard_;
+  BackupManoeuvre guard_;
   Tracker tracker_;
   ActivityJudge activity_;
   Worker worker_;

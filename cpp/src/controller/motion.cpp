@@ -121,7 +121,7 @@ std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& contro
                                 std::to_string(most) + " for " + std::to_string(num) +
                                 " motions: their records may have 8 GiB");
   }
-  std::deque<Controller::Use> uses;
+  std::deque<Controller::ClaimedController> uses;
   for (Controller* const controller : controllers) {
     uses.emplace_back(*controller);
   }

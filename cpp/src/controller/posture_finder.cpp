@@ -26,7 +26,7 @@ Posture PostureFinder::find(const PoseGoal& goal, const Eigen::VectorXd& near, c
   search.starts = attempt == 0 ? starts : starts_again;
   search.seed = settings_.seed + attempt;
   search.another = attempt > 0;
-  search.limit_room = settings_.position_margin + settings_.barriers.limit_activation;
+  search.limit_distance = settings_.position_margin + settings_.barriers.limit_activation;
   bool free_of_itself = false;
   Posture posture =
       find_posture(body_.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
@@ -34,7 +34,7 @@ Posture PostureFinder::find(const PoseGoal& goal, const Eigen::VectorXd& near, c
         free_of_itself = free_of_itself || own.clearance >= 0.0 || body_.label(own.item).kind == CoordinateLabel::Kind::effort;
         return endpoint_checker_.obstructed(q, obstacles, obstruction)
                    ? -infinity
-                   : std::max(0.0, body_.nearest(q, obstacles, 2.0 * search.room, workspace_).clearance);
+                   : std::max(0.0, body_.nearest(q, obstacles, 2.0 * search.clearance, workspace_).clearance);
       });
   posture.touches_itself = posture.found() && !free_of_itself;
   return posture;

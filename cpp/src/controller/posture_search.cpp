@@ -14,24 +14,24 @@
 namespace sidestep {
 namespace {
 
-constexpr int iterations = 50;            // from a configuration nearby about ten are enough
-constexpr int most_fruitless = 8;         // iterations in a row that come no nearer: out of reach from here
-constexpr double progress = 0.99;         // of the error: less is no progress
-constexpr double largest_damping = 0.03;  // [m | rad] directions in which an arm moves less than this are left alone
-constexpr double largest_step = 0.3;      // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
-constexpr double accuracy = 1e-7;         // [m] and [rad]: the frame is at the pose
-constexpr double most_room = 0.05;        // of a joint's range
-constexpr double least_room = 0.02;       // [rad | m] barriers keep the arm off the last of the way to a limit
-constexpr double clearly = 0.9;           // of the error of a posture nearby: less is worth a way to quite another one
+constexpr int iterations = 50;                 // from a configuration nearby about ten are enough
+constexpr int most_fruitless = 8;              // iterations in a row that come no nearer: out of reach from here
+constexpr double progress = 0.99;              // of the error: less is no progress
+constexpr double largest_damping = 0.03;       // [m | rad] directions in which an arm moves less than this are left alone
+constexpr double largest_step = 0.3;           // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
+constexpr double accuracy = 1e-7;              // [m] and [rad]: the frame is at the pose
+constexpr double most_limit_share = 0.05;      // of a joint's range
+constexpr double least_limit_distance = 0.02;  // [rad | m] barriers keep the arm off the last of the way to a limit
+constexpr double clearly = 0.9;                // of the error of a posture nearby: less is worth a way to quite another one
 
 /// Limits with room to them, and a turn for joints that have none.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near,
-                                                            double limit_room) {
+                                                            double limit_distance) {
   Eigen::VectorXd lower = robot.limits().lower, upper = robot.limits().upper;
   for (Eigen::Index j = 0; j < lower.size(); ++j) {
-    const double room = std::min(limit_room, most_room * (upper[j] - lower[j]));
-    lower[j] += room;
-    upper[j] -= room;
+    const double margin = std::min(limit_distance, most_limit_share * (upper[j] - lower[j]));
+    lower[j] += margin;
+    upper[j] -= margin;
     lower[j] = std::isfinite(lower[j]) ? lower[j] : std::min(upper[j], near[j]) - std::numbers::pi;
     upper[j] = std::isfinite(upper[j]) ? upper[j] : std::max(lower[j], near[j]) + std::numbers::pi;
   }
@@ -44,9 +44,9 @@ double size_of(const Posture& posture) noexcept {
 
 class Descent {
  public:
-  Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, double limit_room)
+  Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, double limit_distance)
       : robot_(robot),
-        interval_(finite_interval(robot, near, limit_room)),
+        interval_(finite_interval(robot, near, limit_distance)),
         state_(robot),
         rest_(Eigen::VectorXd::Zero(near.size())) {
     add(goal);
@@ -141,11 +141,12 @@ PoseError pose_error(const PoseGoal& goal, const KinematicState& state) noexcept
 }
 
 Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near,
-                     const PostureSearchSettings& settings, const std::function<double(const Eigen::VectorXd&)>& room) {
-  Descent wide(robot, goal, near, settings.limit_room), narrow(robot, goal, near, std::min(settings.limit_room, least_room));
+                     const PostureSearchSettings& settings, const std::function<double(const Eigen::VectorXd&)>& clearance_at) {
+  Descent wide(robot, goal, near, settings.limit_distance),
+      narrow(robot, goal, near, std::min(settings.limit_distance, least_limit_distance));
   std::mt19937_64 random(settings.seed);
   const auto judged = [&](Posture posture) {
-    posture.room = posture.found() ? room(posture.q) : -infinity;
+    posture.clearance = posture.found() ? clearance_at(posture.q) : -infinity;
     return posture;
   };
   const auto search = [&](const Eigen::VectorXd& from) {
@@ -153,25 +154,25 @@ Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::Vect
     return judged(posture.found() ? std::move(posture) : narrow.from(posture.q));
   };
   Posture best = search(near);
-  if (!settings.another && best.room >= settings.room) {
+  if (!settings.another && best.clearance >= settings.clearance) {
     return best;
   }
   if (settings.another) {
-    best.room = -infinity;  // any other one that is free is better
+    best.clearance = -infinity;  // any other one that is free is better
   }
   Eigen::VectorXd begin(near.size());
   for (int k = 1; k < settings.starts; ++k) {
     const double spread = std::numbers::pi * k / std::max(1, settings.starts - 1);
     random_configuration(random, wide.lower(), wide.upper(), near, spread, begin);
     Posture other = search(begin);
-    if (other.room >= settings.room) {
+    if (other.clearance >= settings.clearance) {
       return other;
     }
-    if (other.found() ? other.room > best.room || !best.found() : size_of(other) < clearly * size_of(best)) {
+    if (other.found() ? other.clearance > best.clearance || !best.found() : size_of(other) < clearly * size_of(best)) {
       best = std::move(other);
     }
   }
-  if (!best.found() && settings.limit_room > 0.0) {
+  if (!best.found() && settings.limit_distance > 0.0) {
     Posture at_limits = judged(Descent(robot, goal, near, 0.0).from(best.q));
     if (size_of(at_limits) < size_of(best)) {
       best = std::move(at_limits);

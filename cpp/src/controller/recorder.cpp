@@ -245,7 +245,7 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
   if (!synchronous_) {
     if (const auto* found = taken.goal.posture) {
       const Posture& p = found->posture;
-      out(TakenKind::posture, found->request_number, found->attempt, p.q, p.position_error, p.rotation_error, p.room,
+      out(TakenKind::posture, found->request_number, found->attempt, p.q, p.position_error, p.rotation_error, p.clearance,
           p.touches_itself);
     }
     if (const auto* found = taken.activations) {

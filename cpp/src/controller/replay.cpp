@@ -314,7 +314,7 @@ void Replay::give_taken(recording::Decoder& in) {
       case TakenKind::posture: {
         FoundPosture found = impl.inputs_.goal().found_postures().current();
         Posture& p = found.posture;
-        in(found.request_number, found.attempt, p.q, p.position_error, p.rotation_error, p.room, p.touches_itself);
+        in(found.request_number, found.attempt, p.q, p.position_error, p.rotation_error, p.clearance, p.touches_itself);
         impl.inputs_.goal().found_postures().put(std::move(found));
         break;
       }

@@ -72,7 +72,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
 
 void Controller::Impl::take_over(double time) noexcept {
   if (sources_.update(measured_.position(), time)) {
-    guard_.look_anew();
+    guard_.invalidate();
   }
   if (inputs_.update()) {
     distances_.forget();
@@ -142,7 +142,7 @@ void Controller::Impl::update_activation_distances(bool looks, const Obstacles& 
   if (looks) {
     sources_.look_for_movers(reference_.q);
     if (obstacles.tree().moves()) {
-      guard_.look_anew();
+      guard_.invalidate();
     }
   }
   if (!model.settings.local_activation) {

@@ -21,12 +21,12 @@ constexpr double dependence_tolerance = 1e-11;
 constexpr int iterations_per_constraint = 10;
 
 /// Whether lower <= upper everywhere, without NaN and without a bound at its own infinity.
-bool leaves_room(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) noexcept {
-  bool room = true;
+bool are_consistent(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) noexcept {
+  bool consistent = true;
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
-    room = room && lower[i] <= upper[i] && lower[i] < infinity && upper[i] > -infinity;
+    consistent = consistent && lower[i] <= upper[i] && lower[i] < infinity && upper[i] > -infinity;
   }
-  return room;
+  return consistent;
 }
 
 /// Whether a row bounds anything.
@@ -315,7 +315,7 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
   if (!all_finite(data.H) || !all_finite(data.g) || !all_finite(data.A)) {
     return QuadraticProgramStatus::not_finite;
   }
-  if (!leaves_room(data.lower, data.upper) || !leaves_room(data.row_lower, data.row_upper)) {
+  if (!are_consistent(data.lower, data.upper) || !are_consistent(data.row_lower, data.row_upper)) {
     const bool unknown = data.lower.hasNaN() || data.upper.hasNaN() || data.row_lower.hasNaN() || data.row_upper.hasNaN();
     return unknown ? QuadraticProgramStatus::not_finite : QuadraticProgramStatus::infeasible;
   }

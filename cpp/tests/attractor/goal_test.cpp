@@ -16,12 +16,12 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 
-GoalPull pull_of(const Robot& robot, const Goal& goal, const Eigen::VectorXd& q) {
+GoalPotential potential_of(const Robot& robot, const Goal& goal, const Eigen::VectorXd& q) {
   KinematicState state(robot);
   state.update(robot, q, Eigen::VectorXd::Zero(q.size()));
-  GoalPull pull(robot.num_coordinates());
-  pull.update(goal, state, Gain(Eigen::MatrixXd::Identity(q.size(), q.size())));
-  return pull;
+  GoalPotential found(robot.num_coordinates());
+  found.update(goal, state, Gain(Eigen::MatrixXd::Identity(q.size(), q.size())));
+  return found;
 }
 
 Eigen::Isometry3d tip_at(const Robot& robot, const Eigen::VectorXd& q) {
@@ -48,16 +48,17 @@ BOOST_AUTO_TEST_CASE(gradients_are_those_of_the_potential) {
     settings.position_only = trial % 3 == 0;
     const Goal goal = PoseGoal(robot, frame, test::random_pose(random, 0.3), settings);
     const Eigen::VectorXd q = random.vector(nv);
-    const GoalPull pull = pull_of(robot, goal, q);
-    if (!settings.position_only && pull.rotation_error > pi - 0.05) {
+    const GoalPotential found = potential_of(robot, goal, q);
+    if (!settings.position_only && found.rotation_error > pi - 0.05) {
       continue;  // the ridge, below
     }
     for (int j = 0; j < nv; ++j) {
       constexpr double step = 1e-6;
       const Eigen::VectorXd dq = step * Eigen::VectorXd::Unit(nv, j);
-      const double slope = (pull_of(robot, goal, q + dq).potential - pull_of(robot, goal, q - dq).potential) / (2.0 * step);
+      const double slope =
+          (potential_of(robot, goal, q + dq).potential - potential_of(robot, goal, q - dq).potential) / (2.0 * step);
       // central differences: step² times third derivatives, and rounding of U over the step
-      BOOST_TEST(std::abs(pull.gradient[j] - slope) < 1e-7 * (1.0 + pull.potential));
+      BOOST_TEST(std::abs(found.gradient[j] - slope) < 1e-7 * (1.0 + found.potential));
     }
   }
 }
@@ -88,11 +89,11 @@ BOOST_AUTO_TEST_CASE(a_half_turn_is_left_and_ends_at_the_goal) {
     PoseGoalSettings settings;
     settings.position_stiffness = 0.0;  // the turn alone
     const Goal goal = PoseGoal(robot, "tip", pose, settings);
-    const GoalPull first = pull_of(robot, goal, q);
+    const GoalPotential first = potential_of(robot, goal, q);
     BOOST_TEST(first.gradient.allFinite());
     BOOST_TEST(std::abs(first.rotation_error - pi) < 1e-6);
     const Rollout motion = rollout(system, q, Eigen::VectorXd::Zero(7), goal, Obstacles::none(), {0.005, 4000});
-    const GoalPull last = pull_of(robot, goal, motion.q.row(4000).transpose());
+    const GoalPotential last = potential_of(robot, goal, motion.q.row(4000).transpose());
     BOOST_TEST(last.rotation_error < 0.02);
   }
 }
@@ -110,10 +111,10 @@ BOOST_AUTO_TEST_CASE(a_position_is_reached_and_the_posture_pull_does_not_move_it
     const Goal goal = PoseGoal(robot, "tip", tip_at(robot, target), settings);
     const Rollout motion = rollout(system, start, Eigen::VectorXd::Zero(7), goal, Obstacles::none(), {0.01, 10000});
     const Eigen::VectorXd end = motion.q.row(10000);
-    const GoalPull pull = pull_of(robot, goal, end);
+    const GoalPotential found = potential_of(robot, goal, end);
     // 100 s at rates of 0.05 /s and more; with the posture pull λ²/σ² of it remains
-    BOOST_TEST(pull.position_error < 5e-3);
-    BOOST_TEST(pull.gradient.norm() < 1e-3);  // nothing is left to gain, of 0.3 rad/s² and more at the start
+    BOOST_TEST(found.position_error < 5e-3);
+    BOOST_TEST(found.gradient.norm() < 1e-3);  // nothing is left to gain, of 0.3 rad/s² and more at the start
     away[posture > 0.0] = (end - settings.rest).norm();
   }
   BOOST_TEST(away[1] < 0.9 * away[0]);  // the free motion is used
@@ -134,7 +135,7 @@ BOOST_AUTO_TEST_CASE(a_moving_goal_is_followed_without_lag) {
     const Rollout motion = rollout(system, start, Eigen::VectorXd::Zero(7), goal, Obstacles::none(), {0.005, 1200});
     if (announced) {
       advance(goal, 6.0);
-      error[1] = pull_of(robot, goal, motion.q.row(1200).transpose()).position_error;
+      error[1] = potential_of(robot, goal, motion.q.row(1200).transpose()).position_error;
     } else {  // the same goal, moved without saying so
       GeometricSystem::Workspace w(system);
       Eigen::VectorXd q = start, v = Eigen::VectorXd::Zero(7);
@@ -146,7 +147,7 @@ BOOST_AUTO_TEST_CASE(a_moving_goal_is_followed_without_lag) {
         q += 0.005 * v;
         advance(goal, 0.005);
       }
-      error[0] = pull_of(robot, goal, q).position_error;
+      error[0] = potential_of(robot, goal, q).position_error;
     }
   }
   BOOST_TEST(error[1] < 0.2 * error[0]);

@@ -395,15 +395,15 @@ BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
     constexpr double cap = 0.5, far = 1.0;  // the room is never more than the cap, whatever the floors
     checked.clearances(q, obstacles, far, w, clearances);
     const double least = std::min(cap, (clearances - floors).minCoeff());
-    const double room = checked.distance_left(q, obstacles, floors, cap, cap, w);
+    const double distance_left = checked.distance_left(q, obstacles, floors, cap, cap, w);
     if (least >= 0.0) {
-      BOOST_TEST(std::abs(room - least) < 1e-12);
+      BOOST_TEST(std::abs(distance_left - least) < 1e-12);
     } else {
-      BOOST_TEST(room < 0.0);
+      BOOST_TEST(distance_left < 0.0);
     }
     constexpr double near = 0.05;
     const double rough = checked.distance_left(q, obstacles, floors, near, cap, w);
-    BOOST_TEST(rough <= room + 1e-12);
-    BOOST_TEST((rough >= near || std::abs(rough - room) < 1e-12 || room < 0.0));
+    BOOST_TEST(rough <= distance_left + 1e-12);
+    BOOST_TEST((rough >= near || std::abs(rough - distance_left) < 1e-12 || distance_left < 0.0));
   }
 }

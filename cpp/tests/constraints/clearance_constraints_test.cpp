@@ -48,7 +48,7 @@ struct Rows : RowBlock {
 };
 
 /// p(u) of the derivation, written out once more.
-double room_needed(double u, const ClosingLimits& limits) {
+double distance_needed(double u, const ClosingLimits& limits) {
   const double A = limits.comfortable, rate = limits.rate;
   return u <= A / rate ? u / rate : u * u / (2.0 * A) + A / (2.0 * rate * rate);
 }
@@ -77,21 +77,21 @@ BOOST_AUTO_TEST_CASE(the_margin_is_kept_for_ever_and_without_hurry) {
     const double period = random.magnitude(1e-4, 0.02);
     const bool exact = random.chance(0.5);
     double closing = random.uniform(-0.5, 2.0);
-    double room = room_needed(std::max(closing, 0.0), limits) + random.magnitude(1e-6, 0.5);
+    double distance_left = distance_needed(std::max(closing, 0.0), limits) + random.magnitude(1e-6, 0.5);
     for (int k = 0; k < 400; ++k) {
-      const double demand = demanded_deceleration(room, closing, limits, period);
+      const double demand = demanded_deceleration(distance_left, closing, limits, period);
       // No more than the deceleration that was planned with. Rounding: closing speeds of 10 over a period of 1e-4.
       const bool comfortable = demand <= limits.comfortable * (1.0 + 1e-9) + 1e-10;
       const double push = random.chance(0.9) ? 10.0 * limits.comfortable : random.uniform(-1.0, 1.0);
       const double deceleration = std::max(demand, -push);
       const double next = closing - deceleration * period;
-      room -= exact ? 0.5 * (closing + next) * period : next * period;
+      distance_left -= exact ? 0.5 * (closing + next) * period : next * period;
       closing = next;
-      const bool outside = room >= -1e-12;  // rounding
-      const bool stoppable = room_needed(closing, limits) <= room + 1e-9 * (1.0 + room);
+      const bool outside = distance_left >= -1e-12;  // rounding
+      const bool stoppable = distance_needed(closing, limits) <= distance_left + 1e-9 * (1.0 + distance_left);
       if (!comfortable || !outside || !stoppable) {  // BOOST_REQUIRE takes longer than the rest of the loop
-        BOOST_FAIL("trial " << trial << " step " << k << ": demand " << demand << " of " << limits.comfortable << ", room "
-                            << room << ", closing at " << closing);
+        BOOST_FAIL("trial " << trial << " step " << k << ": demand " << demand << " of " << limits.comfortable
+                            << ", distance left " << distance_left << ", closing at " << closing);
       }
     }
   }
@@ -100,15 +100,15 @@ BOOST_AUTO_TEST_CASE(the_margin_is_kept_for_ever_and_without_hurry) {
 BOOST_AUTO_TEST_CASE(the_margin_is_reached) {
   // What is kept is the margin, not more: pushed on, the room shrinks with the time constant 1/rate.
   const ClosingLimits limits{2.0, 4.0, 20.0, 0.5};
-  double room = 0.3, closing = 0.0;
+  double distance_left = 0.3, closing = 0.0;
   for (int k = 0; k < 2000; ++k) {
-    const double next = closing - std::max(demanded_deceleration(room, closing, limits, 0.001), -5.0) * 0.001;
-    room -= 0.001 * next;
+    const double next = closing - std::max(demanded_deceleration(distance_left, closing, limits, 0.001), -5.0) * 0.001;
+    distance_left -= 0.001 * next;
     closing = next;
   }
   // 2 s: 0.55 s along the parabola, 1.4 s of time constant 0.05 s.
-  BOOST_TEST(room > 0.0);
-  BOOST_TEST(room < 1e-10);
+  BOOST_TEST(distance_left > 0.0);
+  BOOST_TEST(distance_left < 1e-10);
 }
 
 BOOST_AUTO_TEST_CASE(demands_by_value) {
@@ -119,12 +119,13 @@ BOOST_AUTO_TEST_CASE(demands_by_value) {
   BOOST_TEST(demanded_deceleration(0.001, 0.0, limits, T) == -0.001 / 0.101 / T, boost::test_tools::tolerance(1e-12));
   // On the parabola, the deceleration planned with.
   const double u = 0.8;
-  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u, limits, T) == 2.0, boost::test_tools::tolerance(1e-9));
+  BOOST_TEST(demanded_deceleration(distance_needed(u, limits), u, limits, T) == 2.0, boost::test_tools::tolerance(1e-9));
   // On the line under exact integration, w = (s - uT/2)/(1/10 + T/2): a deceleration of 10 (u + w)/2.
   const double w = (0.01 - 0.5 * T * 0.1) / (0.1 + 0.5 * T);
   BOOST_TEST(demanded_deceleration(0.01, 0.1, limits, T) == 10.0 * 0.5 * (0.1 + w), boost::test_tools::tolerance(1e-9));
   // Too fast by 1 mm/s on the parabola: 2 + 0.5 * 0.001/T, and never above the hardest.
-  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5, boost::test_tools::tolerance(1e-9));
+  BOOST_TEST(demanded_deceleration(distance_needed(u, limits), u + 0.001, limits, T) == 2.5,
+             boost::test_tools::tolerance(1e-9));
   BOOST_TEST(demanded_deceleration(0.01, 1.0, limits, T) == 4.0);
   // Too fast by a half on the line, 10 * 0.15; by more than twice, u^2/2(s - uT).
   BOOST_TEST(demanded_deceleration(0.01, 0.15, limits, T) == 1.5, boost::test_tools::tolerance(1e-12));
@@ -151,10 +152,10 @@ BOOST_AUTO_TEST_CASE(a_stop_along_the_path_meets_all_demands_up_to_twice_the_lin
   for (int trial = 0; trial < 20000; ++trial) {
     const ClosingLimits limits = random_limits(random);
     const double period = random.magnitude(1e-4, 0.02), closing = random.magnitude(0.001, 2.0);
-    const double room = closing * (random.uniform(0.5, 2.0) / limits.rate + period);
-    const double demand = demanded_deceleration(room, closing, limits, period);
+    const double distance_left = closing * (random.uniform(0.5, 2.0) / limits.rate + period);
+    const double demand = demanded_deceleration(distance_left, closing, limits, period);
     BOOST_REQUIRE_LE(demand, limits.rate * closing * (1.0 + 1e-9));
-    above += closing > limits.rate * room ? 1 : 0;
+    above += closing > limits.rate * distance_left ? 1 : 0;
   }
   BOOST_TEST(above > 1000);
 }
@@ -163,19 +164,19 @@ BOOST_AUTO_TEST_CASE(what_is_not_known_of_is_held_off) {
   // Pushed on, while an obstacle comes by `speed` that is not told, or something accelerates the arm unseen.
   const ClosingLimits limits{7.0, 14.0, 20.0, 0.5};
   const double T = 0.001;
-  const auto room_at_the_end = [&](double speed, double acceleration) {
-    double room = 0.1, closing = 0.0;
+  const auto distance_at_the_end = [&](double speed, double acceleration) {
+    double distance_left = 0.1, closing = 0.0;
     for (int k = 0; k < 4000; ++k) {
-      const double demand = std::max(demanded_deceleration(room, closing, limits, T), -5.0);
+      const double demand = std::max(demanded_deceleration(distance_left, closing, limits, T), -5.0);
       closing -= (demand - acceleration) * T;
-      room -= (closing + speed) * T;
+      distance_left -= (closing + speed) * T;
     }
-    return room;
+    return distance_left;
   };
   const auto close = boost::test_tools::tolerance(0.05);
-  BOOST_TEST(room_at_the_end(0.08, 0.0) == -1.5 * 0.08 / 20.0, close);
-  BOOST_TEST(room_at_the_end(0.2, 0.0) == -1.5 * 0.2 / 20.0, close);
-  BOOST_TEST(room_at_the_end(0.0, 3.0) == -3.0 / (2.0 * 20.0 * 20.0), close);
+  BOOST_TEST(distance_at_the_end(0.08, 0.0) == -1.5 * 0.08 / 20.0, close);
+  BOOST_TEST(distance_at_the_end(0.2, 0.0) == -1.5 * 0.2 / 20.0, close);
+  BOOST_TEST(distance_at_the_end(0.0, 3.0) == -3.0 / (2.0 * 20.0 * 20.0), close);
 }
 
 BOOST_AUTO_TEST_CASE(a_violation_decays_without_spikes) {
@@ -183,20 +184,20 @@ BOOST_AUTO_TEST_CASE(a_violation_decays_without_spikes) {
   for (int trial = 0; trial < 300; ++trial) {
     const double A = random.magnitude(1.0, 20.0);
     const ClosingLimits limits{A, 2.0 * A, random.uniform(5.0, 50.0), random.uniform(0.1, 1.0)};
-    const double period = 0.001, first_room = random.uniform(-0.2, 0.05), first_closing = random.uniform(-0.2, 1.0);
-    double room = first_room, closing = first_closing, lowest = room;
+    const double period = 0.001, first_distance = random.uniform(-0.2, 0.05), first_closing = random.uniform(-0.2, 1.0);
+    double distance_left = first_distance, closing = first_closing, lowest = distance_left;
     for (int k = 0; k < 5000; ++k) {
-      const double demand = demanded_deceleration(room, closing, limits, period);
+      const double demand = demanded_deceleration(distance_left, closing, limits, period);
       BOOST_REQUIRE_LE(demand, limits.hardest);
       const double next = closing - demand * period;
-      room -= 0.5 * (closing + next) * period;
+      distance_left -= 0.5 * (closing + next) * period;
       closing = next;
-      lowest = std::min(lowest, room);
+      lowest = std::min(lowest, distance_left);
     }
     // Stops within the distance that A needs, plus that of the last part, which decays with at least 0.1 per period.
     const double u = std::max(first_closing, 0.0);
-    BOOST_REQUIRE_GE(lowest, std::min(first_room, 0.0) - u * u / (2.0 * A) - 10.0 * period * u - 1e-12);
-    BOOST_REQUIRE_SMALL(room, 1e-3);  // and is back at the margin after 5 s, 25 time constants at least
+    BOOST_REQUIRE_GE(lowest, std::min(first_distance, 0.0) - u * u / (2.0 * A) - 10.0 * period * u - 1e-12);
+    BOOST_REQUIRE_SMALL(distance_left, 1e-3);  // and is back at the margin after 5 s, 25 time constants at least
   }
 }
 
@@ -230,8 +231,8 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   for (const double margin : {0.002, 0.05}) {
     clearances.margins[1] = margin;
     rows.update(clearances, v, limits, anything, 0.001);
-    const double room = 0.105 - std::min(margin, 0.005);
-    const double expected = demanded_deceleration(room, 0.4, {2.5, 5.0, 20.0, 0.5}, 0.001);
+    const double distance_left = 0.105 - std::min(margin, 0.005);
+    const double expected = demanded_deceleration(distance_left, 0.4, {2.5, 5.0, 20.0, 0.5}, 0.001);
     BOOST_TEST(rows.lower[0] == (expected + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
   }
   clearances.margins[1] = test::infinity;
@@ -270,12 +271,12 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   const LastMotion last{still, 1.0};
   AccelerationBounds bounds(1);
   Rows rows(1, {});
-  const auto ask = [&](double room, double closing, double of_arm) {
+  const auto ask = [&](double distance_left, double closing, double of_arm) {
     const Eigen::VectorXd v = Eigen::VectorXd::Constant(1, -of_arm);
     bounds.update(limits, still, v, 0.001, {}, &still);
     Clearances clearances(1, 1);
     clearances.nearest << 0;
-    clearances.values[0] = room + rows.constraint.settings().margin;
+    clearances.values[0] = distance_left + rows.constraint.settings().margin;
     clearances.rates[0] = -closing;
     clearances.gradients.col(0) << 1.0;
     clearances.mind_nearest();
@@ -454,16 +455,16 @@ BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_ou
   bounds.lower << -10.0, -5.0;  // close to its lower limit the second joint cannot give all
   bounds.upper << 10.0, 10.0;
   const double now = 0.6 * 10.0 + 0.8 * 5.0;
-  const auto lower = [&](double room, double closing, double curvature) {
-    clearances.values << room + rows.constraint.settings().margin;
+  const auto lower = [&](double distance_left, double closing, double curvature) {
+    clearances.values << distance_left + rows.constraint.settings().margin;
     clearances.rates << -closing;
     clearances.curvatures << curvature;
     clearances.mind_nearest();
     rows.update(clearances, Eigen::VectorXd::Zero(2), limits, bounds, 0.001);
     return rows.lower[0];
   };
-  const auto asked = [&](double room, double closing, double curvature) {
-    return demanded_deceleration(room, closing, {7.0, 14.0, 20.0, 0.5}, 0.001) - curvature;
+  const auto asked = [&](double distance_left, double closing, double curvature) {
+    return demanded_deceleration(distance_left, closing, {7.0, 14.0, 20.0, 0.5}, 0.001) - curvature;
   };
   const auto close = boost::test_tools::tolerance(1e-12);
   BOOST_TEST_REQUIRE(asked(0.3, 2.5, -2.0) > now);
@@ -492,15 +493,15 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   AccelerationBounds bounds(2);
   bounds.lower << -10.0, -10.0;
   bounds.upper << 10.0, 10.0;
-  const auto update = [&](double room, double closing, double curvature, const BrakingTorque* torque = nullptr) {
-    clearances.values << room + rows.constraint.settings().margin;
+  const auto update = [&](double distance_left, double closing, double curvature, const BrakingTorque* torque = nullptr) {
+    clearances.values << distance_left + rows.constraint.settings().margin;
     clearances.rates << -closing;
     clearances.curvatures << curvature;
     clearances.mind_nearest();
     rows.update(clearances, v, limits, bounds, 0.001, torque);
   };
-  const auto asked = [](double room, double closing, double curvature) {
-    return demanded_deceleration(room, closing, {7.0, 14.0, 5.0, 0.5}, 0.001) - curvature;
+  const auto asked = [](double distance_left, double closing, double curvature) {
+    return demanded_deceleration(distance_left, closing, {7.0, 14.0, 5.0, 0.5}, 0.001) - curvature;
   };
   const auto close = boost::test_tools::tolerance(1e-12);
 

@@ -37,9 +37,10 @@ class AbovePlane : public Constraint {
     const Eigen::Vector3d bias = link.bias.linear + link.bias.angular.cross(p) + link.velocity.angular.cross(p_dot);
     gradient_.setZero();
     accumulate_generalised_force(state_, frame_.joint, {p.cross(up), up}, gradient_);  // ∂z/∂q
-    const double room = p.z() - height_;
+    const double distance = p.z() - height_;
     const ClosingLimits limits{1.0, 2.0, 20.0, 0.5};  // [m/s², m/s², 1/s, -]
-    rows.at_least(gradient_, demanded_deceleration(room, -p_dot.z(), limits, now.period) - bias.z(), std::max(-room, 0.0));
+    rows.at_least(gradient_, demanded_deceleration(distance, -p_dot.z(), limits, now.period) - bias.z(),
+                  std::max(-distance, 0.0));
   }
 
  private:

@@ -139,7 +139,7 @@ BOOST_AUTO_TEST_CASE(links_that_overlap_it_when_it_is_taken_may_stay_as_near_as_
   controller.attach(object);
   controller.step(q, Eigen::VectorXd::Zero(nv));
   BOOST_TEST((controller.command().status < SafetyStatus::clearance_lost));
-  BOOST_TEST(std::abs(controller.command().clearance - attached_room) < 1e-9);
+  BOOST_TEST(std::abs(controller.command().clearance - attached_distance) < 1e-9);
   object.may_touch = {"link" + std::to_string(nv - 1)};
   BOOST_TEST(attach(arm, object, q).pairs().size() == arm.pairs().size() + nv - 2);
   BOOST_TEST(attach(arm, object, q).allowed_pairs().size() == 1U);

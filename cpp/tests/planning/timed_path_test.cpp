@@ -69,10 +69,10 @@ BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_safety_rows_let_it) {
     const double slope = (body.nearest(route.motion.q.col(k - 1), obstacles, 1.0, w).clearance - h) /
                          std::max(1e-12, route.motion.station[k] - route.motion.station[k - 1]);
     if (h < 0.1 && slope > 0.05) {
-      const double u = slope * route.motion.v(0, k), room = h - safety.margin, most = A * slope;
+      const double u = slope * route.motion.v(0, k), distance_left = h - safety.margin, most = A * slope;
       const double needed =
           u <= most / safety.rate ? u / safety.rate : 0.5 * (u * u / most + most / (safety.rate * safety.rate));
-      BOOST_TEST(needed <= 1.05 * room + 0.001);  // clearances are looked at 0.05 rad apart
+      BOOST_TEST(needed <= 1.05 * distance_left + 0.001);  // clearances are looked at 0.05 rad apart
     }
   }
 }
@@ -174,8 +174,8 @@ BOOST_AUTO_TEST_CASE(a_path_asks_no_more_of_the_motors_than_they_have) {
   const Robot robot("turning", plain.joints(), plain.frames(), plain.coordinate_names(), limits);
   const Inertial link{1.0, Eigen::Vector3d(0.3, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity()};
   // Gravity along y takes 2.94 Nm of the second joint where it lies along x: there the least share is left.
-  for (const double pull : {0.0, -9.81}) {
-    const RigidBodyDynamics dynamics(robot, {link, link}, Eigen::Vector3d(0.0, pull, 0.0));
+  for (const double along_y : {0.0, -9.81}) {
+    const RigidBodyDynamics dynamics(robot, {link, link}, Eigen::Vector3d(0.0, along_y, 0.0));
     ClearanceQuery::Workspace w(body);
     const RoundedPath path(line(), body, Obstacles::none(), Margins{}, w);
     const TimedPath route =
@@ -198,7 +198,7 @@ BOOST_AUTO_TEST_CASE(a_path_asks_no_more_of_the_motors_than_they_have) {
       last = torque;
     }
     BOOST_TEST(rate <= 1.02 * 0.5 * 200.0);
-    BOOST_TEST((pull != 0.0 || share > 0.6));  // and uses it
+    BOOST_TEST((along_y != 0.0 || share > 0.6));  // and uses it
   }
   BOOST_TEST(route_of(line(), Obstacles::none()).duration() < 1.5);
 }

@@ -28,7 +28,7 @@ struct Attachment {
 /// The arm with an object attached: a frame, ellipsoids, pairs with every covered link that another joint moves, and its inertia
 /// with that of the link.
 /// At q (nv), where it is not empty, the object is apart from everything: a pair whose ellipsoids overlap there may stay as near as
-/// it is (LinkPair::contact), less `attached_room` [m].
+/// it is (LinkPair::contact), less `attached_distance` [m].
 /// Throws std::invalid_argument that names the object and what is wrong: a name that is taken, a link that is unknown or that no
 /// joint moves, no ellipsoid or one that is none, an inertia that is none.
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = {});
@@ -38,7 +38,7 @@ Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = 
 /// and its pose, read in the world's frame, puts it to them at q (nv), where that is not empty.
 std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q = {});
 
-constexpr double attached_room = 0.001;
+constexpr double attached_distance = 0.001;
 
 /// An object that stands on something, and by how much its cover has given way there.
 struct RestingObject {

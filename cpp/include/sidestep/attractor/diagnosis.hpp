@@ -54,7 +54,7 @@ struct Diagnosis {
   double share = 0.0;    ///< its share of what is held back; of several opposed ones it can exceed 1
   double blocked = 0.0;  ///< 1 − |G⁻¹ ∂U| / |∂U|, the part of the goal's pull that is held back
   double speed = 0.0;    ///< |v| [rad/s]
-  // How far the goal is, as in GoalPull; NaN where it has no such part.
+  // How far the goal is, as in GoalPotential; NaN where it has no such part.
   double joint_error = nan, position_error = nan, rotation_error = nan;
   bool prismatic = false;  ///< the joint of `joint_error` is prismatic, so that it is in m
 

@@ -79,7 +79,7 @@ class GeometricSystem {
     /// Input: τ [s] at least by which obstacles that approach are looked for, see Horizon.
     double horizon = Horizon::of_obstacles;
     GraphMetric metric;
-    GoalPull pull;  ///< ∂U, v* and the way left
+    GoalPotential goal;  ///< U, ∂U, v* and the distance to the goal
 
     /// Positions and velocities of the links at the last step.
     const KinematicState& state() const noexcept { return state_; }

@@ -117,8 +117,8 @@ enum class GoalFault {
 GoalFault check(const Goal& goal, const Robot& robot) noexcept;
 
 /// How a goal pulls at a state, and how far it is; made once.
-struct GoalPull {
-  explicit GoalPull(int nv);
+struct GoalPotential {
+  explicit GoalPotential(int nv);
 
   /// Computes everything but for a goal with a fault that makes it unusable. No allocation.
   void update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept;

@@ -39,7 +39,7 @@ class LocalMinimumRecovery {
   explicit LocalMinimumRecovery(const Robot& robot, LocalMinimumSettings settings = {});
 
   /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. q (nv) [rad | m] is the state.
-  /// `potential`, that of the goal followed in the step before (GoalPull::potential; NaN where there was none), serves
+  /// `potential`, that of the goal followed in the step before (GoalPotential::potential; NaN where there was none), serves
   /// for poses; of configurations the distance is known. No allocation.
   const Goal& pursue(const Goal& goal, ConstVectorRef q, double potential, double period) noexcept;
 

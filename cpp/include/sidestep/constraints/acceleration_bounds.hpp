@@ -110,10 +110,10 @@ struct ReturnableAcceleration {
 };
 
 /// The largest acceleration from `least` to `largest` that can be taken back by `jerk` [/s^3] in time for the upper velocity limit and
-/// an upper position limit that is `room` away, at the velocity `speed`; see the derivation above. `least` where none leaves the room,
+/// an upper position limit that is `distance_left` away, at the velocity `speed`; see the derivation above. `least` where none leaves the room,
 /// less than it where the velocity limit asks for more.
-ReturnableAcceleration largest_returnable(double room, double speed, double least, double largest, const ScalarLimits& limits,
-                                          double jerk, double period) noexcept;
+ReturnableAcceleration largest_returnable(double distance_left, double speed, double least, double largest,
+                                          const ScalarLimits& limits, double jerk, double period) noexcept;
 
 /// Its part within `jerk` [/s^3] of the acceleration `before` of the last period; never empty.
 SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,

@@ -86,7 +86,7 @@ class ClearanceConstraints : public Constraint {
  private:
   /// What the stop of a row can count on; no jerk [m/s³]: nothing is known of it.
   struct Reserve {
-    double room = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
+    double distance_left = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
     double before = 0.0;  ///< ∇h·a of the last period
     double margin = 0.0;
     bool seen = false;  ///< by a sensor: its whole margin counts
@@ -100,7 +100,7 @@ class ClearanceConstraints : public Constraint {
   };
   /// One clearance that closes: distance left s, closing speed u, curvature c, and what the arm has against it.
   struct Closing {
-    double room, u, c;
+    double distance_left, u, c;
     double of_arm;        ///< closing speed by the arm's own motion
     double hardest, now;  ///< decelerations: by the limits, and within the bounds of now
     bool lasts;           ///< with `now` the room lasts
@@ -109,7 +109,7 @@ class ClearanceConstraints : public Constraint {
   };
 
   void choose(const Clearances& clearances, const PathStop& stop, double period, int first, RowBlock& rows) noexcept;
-  double room_of(const Clearances& clearances, Eigen::Index k) const noexcept;
+  double distance_left_of(const Clearances& clearances, Eigen::Index k) const noexcept;
   /// The closing of row `row`, and what it demands at first.
   Closing closing_of(int row, const Clearances& clearances, const BrakingState& state, const PathStop& stop,
                      double& required) noexcept;
@@ -119,7 +119,7 @@ class ClearanceConstraints : public Constraint {
   double with_jerk(double asked, const Closing& closing, int row, ConstVectorRef gradient, const BrakingState& state,
                    PathStop& stop) noexcept;
   /// What a row asks for where jerk is limited: more early, or less where a smooth stop at A fits into the room.
-  static double smoothed(double required, double room, double closing_speed, double curvature, double A,
+  static double smoothed(double required, double distance_left, double closing_speed, double curvature, double A,
                          ConstVectorRef gradient, const LastMotion& last, const AccelerationBounds& bounds,
                          const JointLimits& limits, double period) noexcept;
   double within_rates(ConstVectorRef direction, double asked, const RateLimits& rates) noexcept;

@@ -89,8 +89,8 @@ struct ClosingLimits {
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
 // would be flung about, for next to nothing. While the arm is led past an obstacle, rows do not begin early: they would hold it back.
 
-/// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
+/// The deceleration (u − w_max)/T [m/s²] that a clearance with `distance_left` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
-double demanded_deceleration(double room, double closing_speed, const ClosingLimits& limits, double period) noexcept;
+double demanded_deceleration(double distance_left, double closing_speed, const ClosingLimits& limits, double period) noexcept;
 
 }  // namespace sidestep

@@ -54,13 +54,13 @@ class Controller {
   Controller& operator=(const Controller&) = delete;
 
   /// Claims a controller for one run, in programs where two parts might call `step`.
-  class Use {
+  class ClaimedController {
    public:
     /// Throws std::runtime_error if it is reserved already.
-    explicit Use(Controller& controller);
-    Use(const Use&) = delete;
-    Use& operator=(const Use&) = delete;
-    ~Use() { end(); }
+    explicit ClaimedController(Controller& controller);
+    ClaimedController(const ClaimedController&) = delete;
+    ClaimedController& operator=(const ClaimedController&) = delete;
+    ~ClaimedController() { end(); }
     void end() noexcept {
       if (controller_ != nullptr) {
         std::exchange(controller_, nullptr)->in_use_.store(false, std::memory_order_release);
@@ -114,7 +114,7 @@ class Controller {
   void set_arm(Arm arm);
   /// A link holds this object from now on, see sidestep::attach. At the arm's last configuration it counts as apart from all
   /// links. An object that rests on obstacles there (Attachment::rests_on) may stay as near to them as it is, see
-  /// sidestep::resting, until its whole cover is `lifted_room` away from all obstacles. Throws std::invalid_argument that names
+  /// sidestep::resting, until its whole cover is `lifted_clearance` away from all obstacles. Throws std::invalid_argument that names
   /// what is wrong, for example an object that rests before the first step; then nothing changes.
   /// Returns what is implausible about where it is, in words, see sidestep::doubt; empty: nothing.
   std::string attach(const Attachment& object);

@@ -33,7 +33,7 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
 /// The motions of several controllers, each as `integrate` gives it, bit for bit, on `threads` threads (0: one per
 /// processor). Row k of q, v (N, nv) and of goals, which may be empty, is of controller k. Throws as `integrate` does,
 /// std::invalid_argument also on a controller that is there twice, records of more than 8 GiB, and a number of threads
-/// that is not from 0 to 1024; std::runtime_error if a controller is in use, see Controller::Use. `interrupted` is
+/// that is not from 0 to 1024; std::runtime_error if a controller is in use, see Controller::ClaimedController. `interrupted` is
 /// asked by the calling thread.
 std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& controllers, const Eigen::MatrixXd& q,
                                           const Eigen::MatrixXd& v, int steps, const Eigen::MatrixXd& goals = {},

@@ -57,7 +57,7 @@ class RealTimeRun {
   void run() noexcept;
 
   Controller& controller_;
-  Controller::Use use_;
+  Controller::ClaimedController use_;
   RealTimeSettings settings_;
   ArmState now_;
   TripleBuffer<ArmState> state_;

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "sidestep/guard/failsafe_stop.hpp"
+#include "sidestep/guard/stop_trajectory.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/scene/obstacles.hpp"
 #include "sidestep/clearance/clearance_query.hpp"
@@ -32,10 +32,10 @@ struct StopTorque {
 /// Torques that change slowly take long stops. Where there is none, none is looked for in a few periods, as that takes long.
 ///
 /// One thread at a time; nothing here allocates after construction.
-class Failsafe {
+class BackupManoeuvre {
  public:
   /// `body`, which stays; `limits` of the motion; `margin` of clearances [m]; period [s].
-  Failsafe(const ClearanceQuery& body, const JointLimits& limits, double margin, double period);
+  BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period);
 
   /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
   void reset() noexcept {
@@ -43,7 +43,7 @@ class Failsafe {
     num_looked_ = 0;
   }
   /// The obstacles are others, or have moved: places are looked at again when they are needed, a few in a step.
-  void look_anew() noexcept;
+  void invalidate() noexcept;
 
   /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). Where that changes faster than
   /// the limits allow, only as much of the change is made. True where another acceleration is written to `a`: that, or that of a
@@ -66,7 +66,7 @@ class Failsafe {
   bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
                  const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
-  bool is_free(const FailsafeStop& stop, const Obstacles& obstacles) noexcept;
+  bool is_free(const StopTrajectory& stop, const Obstacles& obstacles) noexcept;
   /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
   double look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
@@ -80,7 +80,7 @@ class Failsafe {
   JointLimits slowed_;            // with less acceleration
   const double floor_, spacing_;  // [m] of clearance, and of motion between looks
   const double period_;
-  FailsafeStop stop_, next_stop_;     // from here, and from where this period ends
+  StopTrajectory stop_, next_stop_;   // from here, and from where this period ends
   bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
   Eigen::VectorXd next_q_, next_v_, next_a_, q_, next_place_, a_, force_;
   Eigen::VectorXd clearances_, floors_, last_floors_;  // of items

@@ -1,4 +1,4 @@
-#include "failsafe.hpp"
+#include "backup_manoeuvre.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +24,7 @@ constexpr int pause = 16;                // [periods] after a torque's stop was 
 
 }  // namespace
 
-Failsafe::Failsafe(const ClearanceQuery& body, const JointLimits& limits, double margin, double period)
+BackupManoeuvre::BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period)
     : body_(body),
       room_(body),
       limits_(limits),
@@ -54,13 +54,13 @@ void StopTorque::of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noe
   }
 }
 
-void Failsafe::look_anew() noexcept {
+void BackupManoeuvre::invalidate() noexcept {
   stale_.fill(true);
   checks_ = most_looked / looks_again;
 }
 
-bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
-                    const StopTorque* torque, Eigen::VectorXd& a) noexcept {
+bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
+                           const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
   left_ = looks_again;
   checks_ = std::max(0, checks_ - 1);
   // As much of the change as the limits allow.
@@ -105,8 +105,8 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   return share < 1.0;
 }
 
-bool Failsafe::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
-                            const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
+bool BackupManoeuvre::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
+                                   const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
   if (!known_ && !find_stop(q, v, last, obstacles, torque)) {
     pause_ = torque != nullptr ? pause : 0;
     return false;
@@ -121,7 +121,7 @@ bool Failsafe::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, 
   return true;
 }
 
-double Failsafe::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
+double BackupManoeuvre::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
   double share = 1.0;
   for (Eigen::Index j = 0; j < a.size(); ++j) {
     const double change = a[j] - last[j], rounding = rounded * (1.0 + std::abs(a[j]));
@@ -136,13 +136,13 @@ double Failsafe::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd
   return share;
 }
 
-bool Failsafe::is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept {
+bool BackupManoeuvre::is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept {
   torque.of(a, force_);
   return (force_.array().abs() <= limits_.effort.array()).all();
 }
 
-bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
-                    const StopTorque* torque) noexcept {
+bool BackupManoeuvre::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
+                           const StopTorque* torque) noexcept {
   if (torque == nullptr) {
     return next_stop_.plan(q, v, a, limits_, period_, jerk_of_stops);
   }
@@ -160,8 +160,8 @@ bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   return false;
 }
 
-bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
-                         const Obstacles& obstacles, const StopTorque* torque) noexcept {
+bool BackupManoeuvre::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
+                                const Obstacles& obstacles, const StopTorque* torque) noexcept {
   if (!plan(q, v, a, torque) || !is_free(next_stop_, obstacles)) {
     return false;
   }
@@ -169,7 +169,7 @@ bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, con
   return known_ = true;
 }
 
-void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
+void BackupManoeuvre::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
   body_.clearances(q, obstacles, floor_ + below_now, room_, clearances_);
   low_ = false;
   for (Eigen::Index i = 0; i < floors_.size(); ++i) {
@@ -185,7 +185,7 @@ void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) 
   }
 }
 
-double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
+double BackupManoeuvre::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
   const double far = obstacles.tree().moves() ? far_from_moving : far_from_body;
   const double room = body_.distance_left(q, obstacles, floors_, near_body, far, room_);
   if (room >= 0.0) {
@@ -196,7 +196,7 @@ double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noex
   return room;
 }
 
-double Failsafe::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
+double BackupManoeuvre::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
   const Eigen::VectorXd& reach = body_.reach();
   const int num = std::min(num_looked_, most_looked);
   for (int n = 0; n < num; ++n) {
@@ -229,7 +229,7 @@ double Failsafe::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) n
   return room;
 }
 
-bool Failsafe::is_free(const FailsafeStop& stop, const Obstacles& obstacles) noexcept {
+bool BackupManoeuvre::is_free(const StopTrajectory& stop, const Obstacles& obstacles) noexcept {
   const Eigen::VectorXd& reach = body_.reach();
   stop.position(0, q_);
   double room = room_at(q_, obstacles);

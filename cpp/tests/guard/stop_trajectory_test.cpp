@@ -1,5 +1,5 @@
 // Stops from random states: they end at rest, exactly, and keep every limit on the way.
-#include "sidestep/guard/failsafe_stop.hpp"
+#include "sidestep/guard/stop_trajectory.hpp"
 
 #include <boost/test/unit_test.hpp>
 #include <cmath>
@@ -42,7 +42,7 @@ BOOST_AUTO_TEST_CASE(a_stop_ends_at_rest_and_keeps_every_limit) {
   for (int trial = 0; trial < 200; ++trial) {
     limits.jerk = Eigen::VectorXd::NullaryExpr(nv, [&](Eigen::Index) { return random.magnitude(50.0, 1e4); });
     const Moving begin = random_state(random, limits);
-    FailsafeStop stop(nv);
+    StopTrajectory stop(nv);
     BOOST_REQUIRE(stop.plan(begin.q, begin.v, begin.a, limits, T));
     Eigen::VectorXd q = begin.q, v = begin.v, last = begin.a, a(nv), there(nv), farthest = Eigen::VectorXd::Zero(nv);
     while (stop.num_periods() > 0) {
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(a_stop_is_hardly_longer_than_the_shortest) {
   limits.jerk.setConstant(1000.0);
   Eigen::VectorXd v = Eigen::VectorXd::Zero(nv);
   v[2] = 2.0;
-  FailsafeStop stop(nv);
+  StopTrajectory stop(nv);
   BOOST_REQUIRE(stop.plan(Eigen::VectorXd::Zero(nv), v, Eigen::VectorXd::Zero(nv), limits, T));
   BOOST_TEST(stop.num_periods() >= 210);
   BOOST_TEST(stop.num_periods() <= 252);  // 1.25 v/A, and a whole ramp
@@ -87,7 +87,7 @@ BOOST_AUTO_TEST_CASE(a_joint_near_its_limit_stops_by_itself) {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
   v[0] = 0.9 * limits.velocity[0];  // takes the longest
   v[3] = 0.05;
-  FailsafeStop stop(nv);
+  StopTrajectory stop(nv);
   BOOST_REQUIRE(stop.plan(q, v, a, limits, T));
   const double with_all = stop.way()[3];
   q[3] = limits.upper[3] - 0.5 * with_all;
@@ -101,7 +101,7 @@ BOOST_AUTO_TEST_CASE(planning_a_stop_allocates_nothing) {
   Random random(8);
   JointLimits limits = test::arm_limits(nv);
   limits.jerk.setConstant(500.0);
-  FailsafeStop stop(nv);
+  StopTrajectory stop(nv);
   const Moving state = random_state(random, limits);
   Eigen::VectorXd a(nv);
   bool planned = false;

@@ -1,4 +1,4 @@
-#include "sidestep/guard/failsafe_stop.hpp"
+#include "sidestep/guard/stop_trajectory.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ constexpr int hold_of_ramp = 3;  // a fifth of the stop for each ramp: stops tha
 
 }  // namespace
 
-FailsafeStop::FailsafeStop(int num_coordinates)
+StopTrajectory::StopTrajectory(int num_coordinates)
     : shapes_(static_cast<std::size_t>(num_coordinates)),
       shortest_(shapes_),
       passes_(shapes_.size()),
@@ -19,17 +19,17 @@ FailsafeStop::FailsafeStop(int num_coordinates)
       hardest_(first_),
       way_(first_) {}
 
-double FailsafeStop::plateau(double v, double a, const Shape& shape, double period) noexcept {
+double StopTrajectory::plateau(double v, double a, const Shape& shape, double period) noexcept {
   return (v / period + 0.5 * a * (shape.ramp - 1)) / (shape.ramp + shape.hold);
 }
 
-bool FailsafeStop::keeps(double v, double a, double most_a, double most_step, const Shape& shape, double period) noexcept {
+bool StopTrajectory::keeps(double v, double a, double most_a, double most_step, const Shape& shape, double period) noexcept {
   const double p = plateau(v, a, shape, period), step = std::max(std::abs(p + a), std::abs(p));
   return std::abs(p) <= most_a * (1.0 + rounding) && step <= most_step * shape.ramp * (1.0 + rounding);
 }
 
-FailsafeStop::Shape FailsafeStop::shortest(double v, double a, double most_a, double most_step, double period,
-                                           const Shape& near) noexcept {
+StopTrajectory::Shape StopTrajectory::shortest(double v, double a, double most_a, double most_step, double period,
+                                               const Shape& near) noexcept {
   // Of a shape with a hold of `part` ramps the least ramp, looked for from that of a stop before on.
   const auto least = [&](int part) {
     const auto suffices = [&](int ramp) { return keeps(v, a, most_a, most_step, {ramp, part * ramp}, period); };
@@ -56,7 +56,7 @@ FailsafeStop::Shape FailsafeStop::shortest(double v, double a, double most_a, do
   return trapezium.num_periods() < triangle.num_periods() ? trapezium : triangle;
 }
 
-double FailsafeStop::at(Eigen::Index joint, int period) const noexcept {
+double StopTrajectory::at(Eigen::Index joint, int period) const noexcept {
   const Shape& shape = shapes_[static_cast<std::size_t>(joint)];
   const double a = first_[joint], p = -hardest_[joint];
   const int k = period + 1;
@@ -67,7 +67,7 @@ double FailsafeStop::at(Eigen::Index joint, int period) const noexcept {
   return left >= shape.ramp ? -p : left > 0 ? -p * left / shape.ramp : 0.0;
 }
 
-double FailsafeStop::place(Eigen::Index joint, int periods) const noexcept {
+double StopTrajectory::place(Eigen::Index joint, int periods) const noexcept {
   const Shape& shape = shapes_[static_cast<std::size_t>(joint)];
   const Passes& at = passes_[static_cast<std::size_t>(joint)];
   const double a = first_[joint], p = -hardest_[joint], T = period_, r = shape.ramp;
@@ -83,8 +83,8 @@ double FailsafeStop::place(Eigen::Index joint, int periods) const noexcept {
   return at.left_q + T * (k * at.left_v - T * p / r * up * (0.5 * r - (k + 2.0) / 6.0));
 }
 
-bool FailsafeStop::fits(Eigen::Index joint, double q, double v, double a, const JointLimits& limits, double most_step,
-                        double period) noexcept {
+bool StopTrajectory::fits(Eigen::Index joint, double q, double v, double a, const JointLimits& limits, double most_step,
+                          double period) noexcept {
   const Shape& shape = shapes_[static_cast<std::size_t>(joint)];
   if (!keeps(v, a, limits.acceleration[joint], most_step, shape, period)) {
     return false;
@@ -122,8 +122,8 @@ bool FailsafeStop::fits(Eigen::Index joint, double q, double v, double a, const 
          fastest <= std::max(limits.velocity[joint], std::abs(v)) * (1.0 + rounding);
 }
 
-bool FailsafeStop::plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const JointLimits& limits, double period,
-                        double jerk_share) noexcept {
+bool StopTrajectory::plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const JointLimits& limits, double period,
+                          double jerk_share) noexcept {
   const Eigen::Index nv = first_.size();
   Shape common;
   for (Eigen::Index j = 0; j < nv; ++j) {
@@ -151,13 +151,13 @@ bool FailsafeStop::plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, co
   return true;
 }
 
-void FailsafeStop::acceleration(int periods, Eigen::VectorXd& a) const noexcept {
+void StopTrajectory::acceleration(int periods, Eigen::VectorXd& a) const noexcept {
   for (Eigen::Index j = 0; j < first_.size(); ++j) {
     a[j] = at(j, passed_ + periods);
   }
 }
 
-void FailsafeStop::position(int periods, Eigen::VectorXd& q) const noexcept {
+void StopTrajectory::position(int periods, Eigen::VectorXd& q) const noexcept {
   for (Eigen::Index j = 0; j < first_.size(); ++j) {
     q[j] = place(j, passed_ + periods);
   }

@@ -18,9 +18,9 @@ namespace sidestep {
 ///
 /// All joints have the same r and m, the least of two shapes with which every joint keeps its limits: the arm stops nearly along
 /// its path. A joint that would leave its position or velocity limits so has the least r and m of its own.
-class FailsafeStop {
+class StopTrajectory {
  public:
-  explicit FailsafeStop(int num_coordinates);
+  explicit StopTrajectory(int num_coordinates);
 
   /// Plans the stop from q [rad | m], v [/s], a [/s²] (nv), finite; period T [s]. Of jerk limits it takes `jerk_share`. False where
   /// no stop with ramps of at most `most_periods` keeps acceleration, position and velocity limits. No allocation.
