@@ -8,29 +8,24 @@
 namespace sidestep {
 namespace {
 
-constexpr double jerk_of_stops = 0.95;   // of the limits
-constexpr double of_margin = 0.2;        // of clearance that stops keep: the rest of the margin gives way before the jerk
-constexpr double below_now = 0.0002;     // [m] by which they may come nearer, where there is less
-constexpr double least_look = 0.0002;    // [m] of motion between two looks, where the floor is lower
-constexpr double near_body = 0.03;       // [m] nearer than that a look is exact
-constexpr double far_from_body = 1.0;    // [m] farther is as good
-constexpr double far_from_moving = 0.1;  // [m] the same, where something moves: it is as far for as long as a stop takes
-constexpr double early = 0.75;           // of the room at a place, up to where it serves
-constexpr int looks_again = 16;          // in a step
-constexpr int first_strides = 16;        // of a stop
-constexpr double rounded = 1e-6;         // relative
-constexpr int slower_stops = 3;          // each with half the acceleration
-constexpr int pause = 16;                // [periods] after a torque's stop was looked for in vain
+constexpr double jerk_of_stops = 0.95;    // Share of the jerk limits that a stop uses [-]; the rest is reserve.
+constexpr double of_margin = 0.2;         // Share of the margin that stops keep [-]: the rest gives way before the jerk limit.
+constexpr double below_now = 0.0002;      // Distance by which a clearance below the usual floor may still shrink [m].
+constexpr double least_spacing = 0.0002;  // Least motion between two checks [m], where the floor is lower.
+constexpr int first_strides = 16;         // Number of strides into which the check first divides a stop.
+constexpr double limit_rounding = 1e-6;   // Relative excess of a limit that counts as rounding.
+constexpr int slower_stops = 3;           // Number of stops tried, each with half the acceleration of the one before.
+constexpr int pause = 16;                 // Periods without a search after one with torque found no stop: it takes long.
 
 }  // namespace
 
 BackupManoeuvre::BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period)
     : body_(body),
-      room_(body),
+      workspace_(body),
       limits_(limits),
       slowed_(limits),
       floor_(of_margin * margin),
-      spacing_(std::max(floor_, least_look)),
+      spacing_(std::max(floor_, least_spacing)),
       period_(period),
       stop_(body.robot().num_coordinates()),
       next_stop_(stop_),
@@ -44,8 +39,7 @@ BackupManoeuvre::BackupManoeuvre(const ClearanceQuery& body, const JointLimits& 
       clearances_(Eigen::VectorXd::Zero(body.num_items())),
       floors_(clearances_),
       last_floors_(clearances_),
-      looked_at_(Eigen::MatrixXd::Zero(next_q_.size(), most_looked)),
-      looked_room_(Eigen::VectorXd::Zero(most_looked)) {}
+      places_(body, spacing_) {}
 
 void StopTorque::of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noexcept {
   torque = bias;
@@ -55,15 +49,14 @@ void StopTorque::of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noe
 }
 
 void BackupManoeuvre::invalidate() noexcept {
-  stale_.fill(true);
-  checks_ = most_looked / looks_again;
+  places_.invalidate();
+  rechecking_ = CheckedPlaces::capacity / CheckedPlaces::rechecks_per_step;
 }
 
 bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
                            const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
-  left_ = looks_again;
-  checks_ = std::max(0, checks_ - 1);
-  // As much of the change as the limits allow.
+  places_.begin_step();
+  rechecking_ = std::max(0, rechecking_ - 1);
   const double share = smooth_share(last, a);
   pause_ = std::max(0, pause_ - 1);
   if (pause_ > 0) {
@@ -84,15 +77,15 @@ bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
   next_v_ = v + period_ * next_a_;
   next_q_ = q + period_ * next_v_;
   bool found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
-  if (!found && rises) {  // the stop that is known was free above the floors of before
+  if (!found && rises) {  // The known stop was free above the previous floors.
     floors_ = last_floors_;
     low_ = true;
     found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
   }
   if (!found) {
-    // What is known stays so while nothing changes: looked at from elsewhere it may be below a floor, by no more than a spacing.
-    known_ = known_ && (checks_ == 0 || is_free(stop_, obstacles));
-    // At rest as near as the floors are it may go on all the same: then they are those of there.
+    // A known stop stays valid while nothing changes: checked from another place it may be below a floor, by one spacing at most.
+    known_ = known_ && (rechecking_ == 0 || is_free(stop_, obstacles));
+    // An arm at rest at its floors may move on all the same: the floors are then those of that place.
     const bool leaves = known_ ? stop_.num_periods() <= 0 : share == 1.0;
     if (!leaves) {
       return stop_instead(q, v, last, obstacles, torque, a);
@@ -124,12 +117,12 @@ bool BackupManoeuvre::stop_instead(const Eigen::VectorXd& q, const Eigen::Vector
 double BackupManoeuvre::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
   double share = 1.0;
   for (Eigen::Index j = 0; j < a.size(); ++j) {
-    const double change = a[j] - last[j], rounding = rounded * (1.0 + std::abs(a[j]));
+    const double change = a[j] - last[j], tolerance = limit_rounding * (1.0 + std::abs(a[j]));
     const double most = limits_.acceleration[j];
-    if (std::abs(change) > limits_.jerk[j] * period_ + rounding) {
+    if (std::abs(change) > limits_.jerk[j] * period_ + tolerance) {
       share = std::min(share, limits_.jerk[j] * period_ / std::abs(change));
     }
-    if (std::abs(a[j]) > most + rounding) {
+    if (std::abs(a[j]) > most + tolerance) {
       share = std::min(share, std::max(0.0, (most - std::copysign(last[j], change * last[j])) / std::abs(change)));
     }
   }
@@ -146,7 +139,7 @@ bool BackupManoeuvre::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
   if (torque == nullptr) {
     return next_stop_.plan(q, v, a, limits_, period_, jerk_of_stops);
   }
-  // One that is slower takes less torque.
+  // A slower stop takes less torque.
   slowed_.acceleration = limits_.acceleration;
   for (int k = 0; k < slower_stops; ++k) {
     if (!next_stop_.plan(q, v, a, slowed_, period_, jerk_of_stops * torque->jerk_share)) {
@@ -170,7 +163,7 @@ bool BackupManoeuvre::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd&
 }
 
 void BackupManoeuvre::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
-  body_.clearances(q, obstacles, floor_ + below_now, room_, clearances_);
+  body_.clearances(q, obstacles, floor_ + below_now, workspace_, clearances_);
   low_ = false;
   for (Eigen::Index i = 0; i < floors_.size(); ++i) {
     double floor = std::min(floor_, clearances_[i] - below_now);
@@ -179,75 +172,31 @@ void BackupManoeuvre::set_floors(const Eigen::VectorXd& q, const Obstacles& obst
     }
     if (floor != floors_[i]) {
       floors_[i] = floor;
-      num_looked_ = 0;  // places count by the floors
+      places_.clear();  // Their distances are those to the floors.
     }
     low_ = low_ || floor < floor_;
   }
 }
 
-double BackupManoeuvre::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
-  const double far = obstacles.tree().moves() ? far_from_moving : far_from_body;
-  const double room = body_.distance_left(q, obstacles, floors_, near_body, far, room_);
-  if (room >= 0.0) {
-    looked_at_.col(at) = q;
-  }
-  looked_room_[at] = room;
-  stale_[static_cast<std::size_t>(at)] = false;
-  return room;
-}
-
-double BackupManoeuvre::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
-  const Eigen::VectorXd& reach = body_.reach();
-  const int num = std::min(num_looked_, most_looked);
-  for (int n = 0; n < num; ++n) {
-    const int at = hit_ + n < num ? hit_ + n : hit_ + n - num;
-    const auto left = [&] {
-      const double room = looked_room_[at] < 0.0 ? 0.0 : std::max(looked_room_[at], spacing_), least = (1.0 - early) * room;
-      double rest = room;
-      for (Eigen::Index j = 0; j < q.size() && rest > least; ++j) {
-        rest -= reach[j] * std::abs(q[j] - looked_at_(j, at));
-      }
-      return rest > least ? rest : -infinity;
-    };
-    double room = left();
-    if (room > 0.0 && stale_[static_cast<std::size_t>(at)] && left_ > 0) {
-      --left_;
-      look(looked_at_.col(at), at, obstacles);
-      room = left();
-    }
-    if (room > 0.0) {
-      hit_ = at;
-      return room;
-    }
-  }
-  const int at = num_looked_ % most_looked;
-  const double room = look(q, at, obstacles);
-  if (room >= 0.0) {
-    num_looked_ = num_looked_ + 1 < 2 * most_looked ? num_looked_ + 1 : most_looked;
-    hit_ = at;
-  }
-  return room;
-}
-
 bool BackupManoeuvre::is_free(const StopTrajectory& stop, const Obstacles& obstacles) noexcept {
   const Eigen::VectorXd& reach = body_.reach();
   stop.position(0, q_);
-  double room = room_at(q_, obstacles);
-  if (room > reach.dot(stop.way())) {
+  double distance_left = places_.distance_left_at(q_, obstacles, floors_, workspace_);
+  if (distance_left > reach.dot(stop.way())) {
     return true;
   }
-  // On from place to place, by strides that double and are halved.
+  // From place to place: a stride doubles after a success, and is halved after a failure.
   const int num = stop.num_periods();
   int stride = std::max(1, num / first_strides), at = 0;
   double moved = 0.0;
-  while (at < num && room >= 0.0) {
+  while (at < num && distance_left >= 0.0) {
     stride = std::min(stride, num - at);
     stop.position(at + stride, next_place_);
     double motion = 0.0;
     for (Eigen::Index j = 0; j < q_.size(); ++j) {
       motion += reach[j] * std::abs(next_place_[j] - q_[j]);
     }
-    if (moved + motion <= std::max(room, spacing_) || (stride == 1 && moved == 0.0)) {
+    if (moved + motion <= std::max(distance_left, spacing_) || (stride == 1 && moved == 0.0)) {
       q_.swap(next_place_);
       moved += motion;
       at += stride;
@@ -255,11 +204,11 @@ bool BackupManoeuvre::is_free(const StopTrajectory& stop, const Obstacles& obsta
     } else if (stride > 1) {
       stride /= 2;
     } else {
-      room = room_at(q_, obstacles);
+      distance_left = places_.distance_left_at(q_, obstacles, floors_, workspace_);
       moved = 0.0;
     }
   }
-  return room >= 0.0 && room_at(q_, obstacles) >= 0.0;
+  return distance_left >= 0.0 && places_.distance_left_at(q_, obstacles, floors_, workspace_) >= 0.0;
 }
 
 }  // namespace sidestep

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
+#include "checked_places.hpp"
 #include "sidestep/guard/stop_trajectory.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/scene/obstacles.hpp"
@@ -10,26 +10,24 @@
 
 namespace sidestep {
 
-/// What a stop takes of torques, which are M a + h (Coriolis, centrifugal and gravity forces) of now.
+/// Torque of a stop, M a + h, with the mass matrix M and the bias h (Coriolis, centrifugal and gravity forces) of now.
 struct StopTorque {
-  const Eigen::MatrixXd& mass;
-  const Eigen::VectorXd& bias;
-  double jerk_share;  ///< of the jerk limits, with which torques keep their rate
+  const Eigen::MatrixXd& mass;  ///< M (nv × nv)
+  const Eigen::VectorXd& bias;  ///< h (nv) [Nm | N]
+  double jerk_share;            ///< Share of the jerk limits with which torques keep their rate limits [-].
 
-  /// Writes M a + h.
+  /// Writes M a + h (nv).
   void of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noexcept;
 };
 
-/// Lets a motion go on only to states from which a stop is known that keeps every limit and touches nothing; where it would go
-/// on otherwise, it stops instead. So limits of jerk and acceleration are kept among whatever is at rest: of several clearances
-/// that ask for opposite things none has to be met by a demand that comes too late.
+/// Moves on only after it has verified a collision-free stop within all limits; otherwise it takes the stop verified before. So
+/// jerk and acceleration limits hold among obstacles at rest: no clearance has to be met by a demand that comes too late.
 ///
-/// A stop is free where the body keeps its clearances, of obstacles and of its own links, above floors: a fifth of the margin, or
-/// what there was when the first stop was found, if that was less. Places are looked at along it; around one no point of the body
-/// moves farther than R·|Δq|, see ClearanceQuery::reach, so that clearances are known to be as far above the floors, or where that
-/// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
+/// A stop is free if every clearance, of obstacles and of the arm's own links, stays above its floor. A floor is a fifth of the
+/// margin, or the clearance when the first stop was found, if that was smaller. CheckedPlaces proves it along the stop: between
+/// two checks a clearance stays above its floor or, where the distance left is smaller than the floor, above zero.
 ///
-/// Torques that change slowly take long stops. Where there is none, none is looked for in a few periods, as that takes long.
+/// With slow torques stops are long. Where none is found, the search pauses for a few periods, since it takes long.
 ///
 /// One thread at a time; nothing here allocates after construction.
 class BackupManoeuvre {
@@ -37,61 +35,50 @@ class BackupManoeuvre {
   /// `body`, which stays; `limits` of the motion; `margin` of clearances [m]; period [s].
   BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period);
 
-  /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
+  /// Forgets the known stop: the state was not reached by what `keep` returned, or something moves.
   void reset() noexcept {
     known_ = false;
-    num_looked_ = 0;
+    places_.clear();
   }
-  /// The obstacles are others, or have moved: places are looked at again when they are needed, a few in a step.
+  /// The obstacles are others, or have moved: places are checked again when they are needed, a few in each step.
   void invalidate() noexcept;
 
-  /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). Where that changes faster than
-  /// the limits allow, only as much of the change is made. True where another acceleration is written to `a`: that, or that of a
-  /// stop. It stays where it leads on to a stop, where no stop is known and it is within the limits, and where there is none.
-  /// `torque`: null for motion without torque.
+  /// Replaces the wanted acceleration `a` (nv) [/s²] if no free stop follows it, and returns whether it did.
+  ///
+  /// q, v: state; `last`: acceleration of the period before. If `a` changes faster than the limits allow, only the allowed share
+  /// of the change is made. If a free stop follows, that is the result. Otherwise it is the known stop, or one from here. `a`
+  /// stays as it is where there is none, and where the arm rests and no stop is known. `torque`: null for motion without torque.
   bool keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
             const StopTorque* torque, Eigen::VectorXd& a) noexcept;
 
  private:
-  static constexpr int most_looked = 512;
-
-  /// The share of the change from `last` to `a` with which acceleration and jerk keep their limits, in [0, 1].
+  /// Share of the change from `last` to `a` with which acceleration and jerk keep their limits, in [0, 1].
   double smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
-  /// Writes the acceleration of the stop that is known, or else of one from here; false where there is none.
+  /// Writes the acceleration of the known stop, or else of one from here; false if there is none.
   bool stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
                     const StopTorque* torque, Eigen::VectorXd& a) noexcept;
-  /// Plans a stop from q, v, a: false where none is within the limits.
+  /// Plans a stop from q, v, a; false if none is within the limits.
   bool plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const StopTorque* torque) noexcept;
-  /// Plans one and takes it where it is free; false where it is not.
+  /// Plans a stop, and takes it as the known one if it is free; false if not.
   bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
                  const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
   bool is_free(const StopTrajectory& stop, const Obstacles& obstacles) noexcept;
-  /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
-  double look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
-  /// How far any of the body may move from q on without a clearance below its floor [m]: by what was looked at before, each place
-  /// good for the spacing at least, or by a look.
-  double room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
 
   const ClearanceQuery& body_;
-  ClearanceQuery::Workspace room_;
+  ClearanceQuery::Workspace workspace_;
   const JointLimits limits_;
-  JointLimits slowed_;            // with less acceleration
-  const double floor_, spacing_;  // [m] of clearance, and of motion between looks
-  const double period_;
-  StopTrajectory stop_, next_stop_;   // from here, and from where this period ends
-  bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
+  JointLimits slowed_;                // Limits with less acceleration.
+  const double floor_, spacing_;      // Usual floor [m], and motion between two checks [m].
+  const double period_;               // [s]
+  StopTrajectory stop_, next_stop_;   // The known stop, from here; one from the end of this period.
+  bool known_ = false, low_ = false;  // Whether a stop is known; whether a floor is below the usual one.
   Eigen::VectorXd next_q_, next_v_, next_a_, q_, next_place_, a_, force_;
-  Eigen::VectorXd clearances_, floors_, last_floors_;  // of items
-  // Where was looked, the newest over the oldest, and the room there.
-  Eigen::MatrixXd looked_at_;
-  Eigen::VectorXd looked_room_;
-  std::array<bool, most_looked> stale_{};
-  int num_looked_ = 0, hit_ = 0;  // hit_: what served last
-  int left_ = 0;                  // looks at stale places in this step
-  int checks_ = 0;                // steps in which a known stop is looked at again
-  int pause_ = 0;                 // steps in which none is looked for
+  Eigen::VectorXd clearances_, floors_, last_floors_;  // One per item of the body [m].
+  CheckedPlaces places_;
+  int rechecking_ = 0;  // Steps left in which a known stop is checked again.
+  int pause_ = 0;       // Steps left in which no stop is searched.
 };
 
 }  // namespace sidestep
