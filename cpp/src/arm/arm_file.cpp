@@ -25,11 +25,14 @@
 namespace sidestep {
 namespace {
 
-constexpr std::string_view magic{"\x89SSARM\r\n", 8};  // not text; a transfer that changes line ends breaks it
-constexpr std::uint32_t version = 2;
-constexpr std::uint32_t oldest_version = 1;  // without jerk limits and rates of effort: they are the defaults
-constexpr std::size_t header_size = 8 + 4 + 8 + 32;
-constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 30;  // [B] an arm has less than a thousandth of it
+// First bytes of every file: not text, and a transfer that changes line ends breaks them.
+constexpr std::string_view magic{"\x89SSARM\r\n", 8};
+constexpr std::uint32_t version = 2;  // Version of the format that is written.
+// Oldest version that is read: without jerk limits and rates of effort, which get their defaults.
+constexpr std::uint32_t oldest_version = 1;
+constexpr std::size_t header_size = 8 + 4 + 8 + 32;  // Size of the header [B]: magic, version, payload size, hash.
+// Largest file that is read [B]: an arm has less than a thousandth of it.
+constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 30;
 
 [[noreturn]] void throw_system_error(const std::string& what, const std::filesystem::path& path) {
   throw std::system_error(errno != 0 ? errno : EIO, std::generic_category(), what + " '" + path.string() + "'");

@@ -16,13 +16,14 @@
 namespace sidestep {
 namespace {
 
-constexpr double solid_level = 5.0;  // yᵀ Σ⁻¹ y on the boundary of a solid ellipsoid of covariance Σ
-constexpr double thinnest = 1e-6;    // [m] of a semi-axis
-// Distance of an object from what holds it that is doubted, in sizes of the holder: a gripper that the arm lacks is in between.
+constexpr double solid_level = 5.0;  // yᵀ Σ⁻¹ y on the boundary of a solid ellipsoid of covariance Σ.
+constexpr double thinnest = 1e-6;    // Smallest semi-axis of a cover [m].
+// Distance of an object from its holder above which the pose is doubted, in sizes of the holder: a gripper that the arm
+// lacks may be in between.
 constexpr double far_sizes = 2.5;
 // Bounds of that size [m]: flanges without a gripper are smaller, long links say nothing of what a hand holds.
 constexpr double least_size = 0.12, most_size = 0.16;
-// Distance that is doubted where the pose, read in the world's frame, puts the object nearer to the link than `at_hand` [m].
+// Distance from the holder above which the pose is doubted [m], if read in the world's frame it is within `at_hand` [m].
 constexpr double apart = 0.15, at_hand = 0.05;
 
 [[noreturn]] void refuse(const Attachment& object, const std::string& why) {
@@ -147,7 +148,7 @@ std::string doubt(const Arm& holding, const Attachment& object, const Eigen::Vec
   const Robot& robot = holding.robot();
   const Body& body = holding.body();
   const Frame& link = robot.frames()[static_cast<std::size_t>(robot.frame_index(object.link))];
-  std::vector<Ellipsoid> holder;  // in the frame of the joint that moves it
+  std::vector<Ellipsoid> holder;  // Ellipsoids of the holder, in the frame of the joint that moves it.
   Eigen::Vector3d low = Eigen::Vector3d::Constant(infinity), high = -low;
   for (int k = 0; k < body.num_components(); ++k) {
     const auto i = static_cast<std::size_t>(k);

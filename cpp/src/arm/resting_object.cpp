@@ -12,10 +12,10 @@
 namespace sidestep {
 namespace {
 
-constexpr int most_cuts = 40;         // of one ellipsoid
-constexpr double tolerance = 5e-4;    // [m] of the distance kept
-constexpr int halvings = 60;          // of the interval of t
-constexpr int num_directions = 2000;  // in which supports are compared
+constexpr int most_cuts = 40;         // Most cuts of one ellipsoid.
+constexpr double tolerance = 5e-4;    // Accuracy of the distance kept [m].
+constexpr int halvings = 60;          // Halvings of the interval of t.
+constexpr int num_directions = 2000;  // Number of directions in which supports are compared.
 
 /// Of an ellipsoid at a point, pointing to it: along the shortest way where the point is outside.
 Eigen::Vector3d normal_at(const Eigen::Vector3d& e, const Eigen::Matrix3d& axes, const Eigen::Vector3d& squares) {
@@ -34,9 +34,9 @@ Eigen::Vector3d normal_at(const Eigen::Vector3d& e, const Eigen::Matrix3d& axes,
 }
 
 struct Cut {
-  double gap = infinity;  // between a plane and the point's ball [m]
+  double gap = infinity;  // Distance between a plane and the point's ball [m].
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double offset = 0.0;  // of the plane that the ellipsoid is to stay behind
+  double offset = 0.0;  // Offset of the plane that the ellipsoid must stay behind [m].
   Eigen::Index point = -1;
 };
 

@@ -26,7 +26,7 @@ void check_gain(const Eigen::MatrixXd& gain, const char* name, int nv) {
     throw std::invalid_argument(std::string(name) + " is " + std::to_string(gain.rows()) + " × " + std::to_string(gain.cols()) +
                                 ", expected " + std::to_string(nv) + " × " + std::to_string(nv));
   }
-  constexpr double tolerance = 1e-12;  // rounding of a symmetric gain, relative to its largest entry
+  constexpr double tolerance = 1e-12;  // Asymmetry of a gain that is rounding, relative to its largest entry.
   const double margin = tolerance * gain.cwiseAbs().maxCoeff() + std::numeric_limits<double>::min();
   const Eigen::MatrixXd shifted = gain + margin * Eigen::MatrixXd::Identity(nv, nv);
   if (!gain.allFinite() || !((gain - gain.transpose()).cwiseAbs().maxCoeff() <= margin) ||

@@ -15,9 +15,9 @@
 namespace sidestep {
 namespace {
 
-// λ [m/rad and 1]: directions that the joints move less than this count as not moved.
+// Damping λ of the pseudo-inverse [m/rad and 1]: directions that the joints move less than this count as not moved.
 constexpr double singular_value_floor = 0.02;
-// A goal at a limit may be beyond it by the rounding of a conversion or of a step along its velocity [rad | m].
+// Distance of a goal beyond a limit that is rounding [rad | m], of a conversion or of a step along its velocity.
 constexpr double limit_rounding = 1e-9;
 
 void check_stiffness(double value, const char* name) {

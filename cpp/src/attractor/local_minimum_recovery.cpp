@@ -10,11 +10,13 @@
 namespace sidestep {
 namespace {
 
-constexpr double half_patience = 0.5;  // a sub-goal need not be reached: half the patience is enough for it
-constexpr double near_sub_goal = 0.2;  // [rad | m] is as good as there
-constexpr double at_goal = 0.01;       // [rad | m] nothing is left to be stuck on the way to
-constexpr double jump = 2.0;           // a squared distance that grows so much in one step is one to another goal,
-constexpr double elsewhere = 0.2;      // [rad | m] and so is one that is so far from that of the step before
+// Share of the patience that is enough on the way to a sub-goal, which need not be reached.
+constexpr double half_patience = 0.5;
+constexpr double near_sub_goal = 0.2;  // Error at which a sub-goal counts as reached [rad | m].
+constexpr double at_goal = 0.01;  // Error at which the goal counts as reached [rad | m]: there is nothing left to be stuck on.
+constexpr double jump = 2.0;      // Growth of the squared distance in one step from which the goal counts as another one.
+// Distance of a goal from that of the step before from which it counts as another one [rad | m].
+constexpr double elsewhere = 0.2;
 
 const LocalMinimumSettings& validated(const LocalMinimumSettings& settings) {
   settings.validate();

@@ -5,10 +5,10 @@
 namespace sidestep {
 namespace {
 
-// Newton's method on S ends after two to four passes. If it has not by then, S is only grown, which ends by itself and
-// resists more than asked for, never less.
+// Passes of Newton's method on S, which usually ends after two to four. From then on S only grows: that ends by itself, and
+// resists more than necessary, never less.
 constexpr int newton_passes = 8;
-constexpr int most_passes = 16;
+constexpr int most_passes = 16;  // Most passes in all.
 
 }  // namespace
 

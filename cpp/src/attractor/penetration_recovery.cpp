@@ -8,7 +8,8 @@
 namespace sidestep {
 namespace {
 
-// ε: a clearance that the joints change by less than 5 cm/rad is pushed less than it asks for [(m/rad)²].
+// Square ε of the gradient below which a clearance is pushed less than it asks for [(m/rad)²]: joints change it by less than
+// 5 cm/rad.
 constexpr double least_gradient_squared = 0.05 * 0.05;
 
 double smoothstep(double x) noexcept {

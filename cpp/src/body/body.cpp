@@ -8,8 +8,9 @@
 
 namespace sidestep {
 namespace {
-constexpr double weight_sum_tolerance = 1e-6;  // weights may have been stored in single precision
-constexpr double symmetry_tolerance = 1e-9;    // relative; rounding of a symmetrised product
+// Deviation of the sum of weights from one: they may have been stored in single precision.
+constexpr double weight_sum_tolerance = 1e-6;
+constexpr double symmetry_tolerance = 1e-9;  // Relative asymmetry of a covariance: rounding of a symmetrised product.
 }  // namespace
 
 Body::Body(std::vector<std::string> links_, Eigen::VectorXd weights_, Eigen::Matrix3Xd means_,

@@ -11,13 +11,13 @@
 namespace sidestep {
 namespace {
 
-constexpr double momentum = 0.9;          // of Adam's first moment
-constexpr double second_momentum = 0.98;  // of its second: forgets in about 50 steps
-constexpr int selection_steps = 5;        // steps for which the points near the union's boundary are kept
-constexpr double reach_in_rates = 1.5;    // how far the boundary is taken to move in that time, in lengths of a step
-constexpr double least_axis = 0.1;        // in `unit`: a semi-axis does not vanish on the way
-constexpr double point_weight = 0.025;    // of a point against the overshoot, at stiffness 1
-constexpr double tiny = 1e-12;            // keeps quotients finite
+constexpr double momentum = 0.9;          // Decay rate of Adam's first moment.
+constexpr double second_momentum = 0.98;  // Decay rate of Adam's second moment: it forgets in about 50 steps.
+constexpr int selection_steps = 5;        // Steps for which the selected points near the union's boundary are kept.
+constexpr double reach_in_rates = 1.5;    // Motion of the boundary assumed in that time, in lengths of a step.
+constexpr double least_axis = 0.1;        // Smallest semi-axis, in `unit`: it must not vanish during the descent.
+constexpr double point_weight = 0.025;    // Weight of a point against the overshoot, at stiffness 1.
+constexpr double tiny = 1e-12;            // Smallest denominator: keeps quotients finite.
 
 struct Adam {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -200,9 +200,9 @@ class Descent {
   std::vector<Eigen::Vector3d> centre_gradients_;
   std::vector<Eigen::Matrix3d> shape_gradients_;
   std::vector<Adam> adam_;
-  std::vector<double> squared_;       // of the radii of the point at hand
-  std::vector<double> surely_;        // squared radii within which a point stays covered until the next selection
-  std::vector<std::size_t> keepers_;  // an ellipsoid that held the point at the last selection
+  std::vector<double> squared_;       // Squared radii of the current point in each ellipsoid.
+  std::vector<double> surely_;        // Squared radii within which a point stays covered until the next selection.
+  std::vector<std::size_t> keepers_;  // Ellipsoid that held the point at the last selection.
   std::vector<Eigen::Index> selected_;
 };
 

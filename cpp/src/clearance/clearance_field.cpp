@@ -11,13 +11,13 @@
 namespace sidestep {
 namespace {
 
-constexpr const char* field_owner = "clearance field";
+constexpr const char* field_owner = "clearance field";  // Name in error messages.
 
 }  // namespace
 
 ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature, double window)
     : temperature_(checked_temperature(temperature, field_owner)), window_(window), links_(body.links) {
-  constexpr double most_window = 600.0;  // beyond e^−700 the exponential of the sums ends
+  constexpr double most_window = 600.0;  // Largest window, in temperatures: beyond e^−700 the exponential of the sums ends.
   if (!(window >= 1.0 && window <= most_window)) {
     throw std::invalid_argument(std::string(field_owner) + ": window is " + std::to_string(window) +
                                 " temperatures, must be from 1 to 600");

@@ -11,7 +11,8 @@ namespace {
 
 using Source = ClearanceItem::Source;
 
-constexpr const char* items_owner = "body clearance";
+constexpr const char* items_owner = "body clearance";  // Name in error messages.
+// Longest activation distance that a margin of a pair is a share of [m]: above that of links that are usually near.
 constexpr double most_activation =
     0.05;  // [m] that a margin of a pair is a share of: longer than of links that are usually near
 
@@ -35,11 +36,11 @@ using Items = std::vector<ClearanceItem>;
 void add_reach(ClearanceItem& item, const Robot& robot, const LinkEllipsoids& link) {
   // Up the chain, with a ball around the origin below that holds the link in every configuration.
   double ball = 0.0;
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // of that origin, from joint j
-  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // Origin of the next joint, from joint j [m].
+  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link.
   for (int j = link.joint; j != item.base;) {
     const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];
-    double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
+    double radius = 0.0, next = 0.0;  // Distance from the axis; then the ball around j.
     if (j == link.joint) {
       for (const LinkEllipsoid& e : link.ellipsoids) {
         radius = std::max(radius, across(e.mean, joint.axis) + e.extent);

@@ -45,7 +45,8 @@ class ClearanceMeans {
   }
 
  private:
-  static constexpr int of_weights = 8, of_heights = 14;  // of force and moment
+  // Places of force and moment in the sums: with the weights, and with weighted heights.
+  static constexpr int of_weights = 8, of_heights = 14;
 
   Vector6d gradient(int first) const noexcept { return Vector6d::Map(sums_ + first); }
   /// What the bias of the link makes of sums of h'', from those of the gradient.

@@ -9,14 +9,15 @@
 namespace sidestep {
 namespace {
 
-constexpr double exact_within = 0.015;  // [m] above a margin: beyond, a lower bound proves an edge well enough
+// Distance above a margin below which a clearance is exact [m]; beyond, a lower bound proves an edge well enough.
+constexpr double exact_within = 0.015;
 
 /// How far an item comes towards what it keeps off, its margin included, within a share of an edge around a place.
 struct Motion {
   double farthest;   // of any point on the whole edge [m]
-  double slope;      // of the margin, per motion
-  double speed;      // of the fastest point at the place [m]
-  double curvature;  // [m]
+  double slope;      // Slope of the margin, per motion.
+  double speed;      // Speed of the fastest point at the place [m].
+  double curvature;  // Curvature of its path [m].
 
   double distance(double share) const noexcept {
     return share * (slope * farthest + std::min(farthest, speed + 0.5 * share * curvature));
@@ -138,7 +139,7 @@ bool ClearanceQuery::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacl
     place(w.q_, w);
     move(w.difference_, w);
     std::uint64_t* const open = w.open_.data() + n * words;
-    double decided = at.half;  // around the middle
+    double decided = at.half;  // Half width of the decided interval, around the middle.
     for (std::size_t word = 0; word < words; ++word) {
       for (std::uint64_t left = std::exchange(open[word], 0); left != 0; left &= left - 1) {
         const int bit = std::countr_zero(left);

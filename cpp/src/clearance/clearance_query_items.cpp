@@ -10,8 +10,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
-constexpr int planes_of_pair = 3;         // tried before the gap of two ellipsoids is looked for
+constexpr double closest_centres = 1e-6;  // Least distance of two centres whose direction is used [m].
+constexpr int planes_of_pair = 3;         // Separating planes tried before the gap of two ellipsoids is computed.
 
 static_assert(kernels::most_balls == PointTree::leaf_size);
 

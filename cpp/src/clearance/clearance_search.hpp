@@ -112,7 +112,7 @@ class ClearanceField::Search {
   }
 
  private:
-  static constexpr int most_put_off = 1024, most_passes = 3;
+  static constexpr int most_put_off = 1024, most_passes = 3;  // Most leaves that are put off, and most passes of the search.
   static_assert(PointTree::leaf_size == kernels::most_points);
 
   static kernels::ClearanceKernel clearance_kernel() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)(); }

@@ -9,10 +9,10 @@
 namespace sidestep {
 namespace {
 
-constexpr float unknown = -std::numeric_limits<float>::infinity();
-constexpr double rounding = 1e-6;  // of distances in single precision, relative and, for cells' places, absolute [m]
-constexpr int offset = 1 << 20;    // of blocks, so that their numbers are positive
-constexpr double farthest = 1e5;   // [m] that a place may be away to have a block
+constexpr float unknown = -std::numeric_limits<float>::infinity();  // Value of a cell that is not measured yet.
+constexpr double rounding = 1e-6;  // Error of distances in single precision: relative and, for cells' places, absolute [m].
+constexpr int offset = 1 << 20;    // Offset of block numbers, so that they are positive.
+constexpr double farthest = 1e5;   // Largest coordinate of a place with a block [m].
 
 /// Below and above a distance that was rounded.
 double below(double distance) noexcept { return distance - rounding * (std::abs(distance) + 1.0); }
@@ -21,7 +21,7 @@ double above(double distance) noexcept { return distance + rounding * (std::abs(
 /// One of the cells that a block is divided into, `count` along each edge.
 struct Cell {
   int number;
-  Eigen::Vector3d centre;  // from the corner of the block
+  Eigen::Vector3d centre;  // Centre, from the corner of the block [m].
 };
 
 template <int count>

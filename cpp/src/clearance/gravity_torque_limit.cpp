@@ -9,8 +9,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double range_share = 0.1;  // of effort / weight, within which the barrier acts
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double range_share = 0.1;                                   // Share of effort / weight within which the barrier acts.
+constexpr double infinite = std::numeric_limits<double>::infinity();  // Bound where there is none.
 
 SpatialMotion moved(const SpatialMotion& by, const SpatialMotion& screw) noexcept {
   return {by.angular.cross(screw.angular), by.angular.cross(screw.linear) + by.linear.cross(screw.angular)};
@@ -29,8 +29,8 @@ double farthest_place(const Robot& robot, const Joint& joint) noexcept {
 
 /// What every joint carries, itself included.
 struct Burdens {
-  std::vector<double> mass, moment;       // [kg], and the largest about the joint's origin [kg m]
-  std::vector<std::vector<int>> carried;  // joints, itself first
+  std::vector<double> mass, moment;       // Masses [kg], and largest moments about the joint's origin [kg m].
+  std::vector<std::vector<int>> carried;  // Joints that each carries, itself first.
 };
 
 Burdens burdens(const Robot& robot, const std::vector<Inertial>& inertials) {

@@ -7,7 +7,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double cover_overshoot = 0.04;  // [m] of the balls that cover an ellipsoid
+constexpr double cover_overshoot = 0.04;  // Largest overshoot of the balls that cover an ellipsoid [m].
 
 LinkEllipsoid in_principal_axes(const BodyEllipsoid& e) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.shape);

@@ -12,8 +12,8 @@
 namespace sidestep {
 namespace {
 
-constexpr int configurations = 101;  // of which the usual clearance of two links is the median
-constexpr int newton_steps = 30;
+constexpr int configurations = 101;  // Number of configurations whose median is the usual clearance of two links.
+constexpr int newton_steps = 30;     // Newton steps for the root that spreads the configurations.
 
 /// Configurations spread evenly over the ranges: n α_j modulo 1, with α_j = x^-(j+1) and x^(nv+1) = x + 1 (Roberts 2018).
 std::vector<Eigen::VectorXd> spread_configurations(const Robot& robot) {

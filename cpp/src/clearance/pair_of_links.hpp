@@ -84,7 +84,7 @@ class PairOfLinks {
   struct Ellipsoids {
     const std::vector<LinkEllipsoid>& ellipsoids;
     const std::vector<EllipsoidRow>& rows;
-    Eigen::Vector3d centre;  // of a ball around them
+    Eigen::Vector3d centre;  // Centre of a ball around them [m].
     double radius;
   };
   /// What is taken at the world origin and expressed in the world, at the origin of the first link and in its frame.
@@ -106,7 +106,7 @@ class PairOfLinks {
   const KinematicState::Link &first_, &second_;
   Eigen::Matrix3d R_;
   Eigen::Vector3d p_;
-  SpatialMotion velocity_;  // of the second, seen from the first, at its origin
+  SpatialMotion velocity_;  // Velocity of the second link, seen from the first, at its origin.
   Ellipsoids a_, b_;
 };
 
@@ -155,7 +155,7 @@ class MeanGap {
   int nearest() const noexcept { return nearest_; }  ///< of the second link
 
  private:
-  static constexpr int capacity = 128;
+  static constexpr int capacity = 128;  // Most ellipsoid pairs in one batch.
 
   struct Pair {
     const BodyEllipsoid *a, *b;
@@ -188,10 +188,10 @@ class MeanGap {
   BoltzmannMean mean_;
   StoppingClearance approach_;
   EllipsoidGaps gaps_;
-  std::array<int, EllipsoidPairs::capacity> components_;  // of the second link
+  std::array<int, EllipsoidPairs::capacity> components_;  // Components of the second link.
   int nearest_ = -1;
   double horizon_, window_;
-  double least_, least_ahead_;  // gaps, and h + τ h', so far
+  double least_, least_ahead_;  // Smallest gap, and smallest h + τ h', so far.
   int size_ = 0;
   std::array<Pair, capacity> pairs_;
 };

@@ -12,7 +12,7 @@ namespace {
 /// Half-width s of a link's ellipsoid along a unit vector n that stands still, with s' and s'' at q̈ = 0.
 struct Support {
   double value, rate, curvature;
-  Eigen::Vector3d point;  ///< of the boundary farthest along n, from the centre (world)
+  Eigen::Vector3d point;  ///< Boundary point farthest along n, from the centre (world) [m].
 
   Support(const KinematicState::Link& link, const BodyEllipsoid& ellipsoid, const Eigen::Vector3d& n) noexcept {
     // n seen from the link; d/dt (Rᵀ z) = Rᵀ (ż − ω × z), twice.

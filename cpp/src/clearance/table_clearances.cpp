@@ -9,7 +9,7 @@
 namespace sidestep {
 namespace {
 
-/// The way to a stop is looked at as often as it passes cells of the table, but no more often than this.
+/// Most samples along the stop: otherwise one per cell of the table that it passes.
 constexpr double most_steps_ahead = 16.0;
 
 /// Of h along the path, as it is seen from here.

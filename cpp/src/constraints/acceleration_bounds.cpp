@@ -172,7 +172,7 @@ ReturnableAcceleration largest_returnable(double distance_left, double speed, do
   if (distance_left < infinity && !fits(found.value)) {
     found.by_position = true;
     double low = least, high = found.value;
-    constexpr int halvings = 24;
+    constexpr int halvings = 24;  // Halvings of the interval of accelerations.
     for (int k = 0; k < halvings && high > low; ++k) {
       const double middle = 0.5 * (low + high);
       (fits(middle) ? low : high) = middle;

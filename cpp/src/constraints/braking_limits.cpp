@@ -9,11 +9,11 @@
 namespace sidestep {
 namespace {
 
-// A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond,
-// lines would be so flat that the arm stood still.
+// Longest stop by torque, in times of the stop by the acceleration limits: with longer ones lines would be so flat that the
+// arm stands still.
 constexpr double longest_stop = 10.0;
-constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
-constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
+constexpr double linear = 1e4;                // Weight of the direction against the size of accelerations.
+constexpr double largest_acceleration = 1e3;  // Acceleration bound of joints without a limit [/s²].
 
 }  // namespace
 

@@ -11,13 +11,14 @@
 namespace sidestep {
 namespace {
 
-// What closes in no more than this [m/s] faster than by the arm's own motion is held off by the margin.
+// Closing speed beyond the arm's own that the margin holds off [m/s].
 constexpr double slow = 0.01;
-// Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
+// Braking deceleration that stands for zero [m/s²], so that the profile stays defined.
 constexpr double least_deceleration = 1e-6;
-// What accelerations and torques leave together is looked for where so small a share of what they leave alone would matter.
+// Share of the deceleration by acceleration or torque limits alone [-]: only where so little would not suffice, what both
+// allow together is computed.
 constexpr double scarce = 0.05;
-// Share of the hardest deceleration that a smooth stop counts on.
+// Share of the hardest deceleration that a smooth stop counts on [-].
 constexpr double of_hardest = 0.75;
 
 }  // namespace
@@ -31,7 +32,7 @@ ClearanceConstraints::Closing ClearanceConstraints::closing_of(int row, const Cl
   const double by_torque = state.torque == nullptr ? infinity : braking_.hardest_by_torque(row, limits, *state.torque);
   const double by_limits = largest_product(gradient, -limits.acceleration, limits.acceleration);
   const double distance_left = distance_left_of(clearances, k), u = -approach.rates[k];
-  // Either alone may promise more than there is: torques that brake hardest may fling joints about. Where it may matter.
+  // Either limit alone may promise more than both allow together: torques that brake hardest may fling joints about.
   double by_both = std::min(by_limits, by_torque);
   const bool counts = state.torque != nullptr && u > 0.0 && u / stop.rate + 0.5 * u * u / (scarce * by_both) > distance_left;
   if (counts) {
@@ -40,7 +41,7 @@ ClearanceConstraints::Closing ClearanceConstraints::closing_of(int row, const Cl
   const double hardest = std::max(std::min(by_limits, by_torque), least_deceleration);
   const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, least_deceleration), hardest, stop.rate,
                               settings_.correction};
-  // Of the points, but no more than the mean where it says that a surface recedes: see the header.
+  // Curvature of the point, limited by that of the mean if a surface recedes: see the header.
   const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
   required = demanded_deceleration(distance_left, u, closing, state.period) - c;
   double now = std::min(largest_product(gradient, state.bounds.lower, state.bounds.upper), by_torque);
@@ -76,7 +77,7 @@ double ClearanceConstraints::without_excess(double required, const Closing& clos
     return now;
   }
   if (distance_left <= 0.0 && required > now && net > 0.0) {
-    // Of what closes in, not of the way back.
+    // For the approach, not for recovery.
     return std::min(required, std::max(now, settings_.correction * u / period - c));
   }
   return required;
@@ -96,7 +97,7 @@ double ClearanceConstraints::with_jerk(double asked, const Closing& closing, int
   double required = smoothed(asked, closing.distance_left, closing.u, closing.c, of_hardest * closing.hardest, gradient, last,
                              state.bounds, state.limits, state.period);
   const bool smooth = required < asked;
-  // What motors that change their torque no faster can do next: beyond it light joints would be flung about, and little else.
+  // At most what the torque rate allows next: more would fling light joints about for little effect.
   if (state.torque != nullptr && last.rates != nullptr && required == asked && asked > last.acceleration.dot(gradient)) {
     required = within_rates(gradient, required, *last.rates);
   }
@@ -128,7 +129,7 @@ double ClearanceConstraints::smoothed(double required, double distance_left, dou
     return smooth_stop_fits(distance_left, u, x + lasting, A, share * jerk, period);
   };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
-  if (!last.lost && distance_left <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
+  if (!last.lost && distance_left <= 0.0 && u <= creeping) {  // The clearance does not close: recovery respects the jerk limit.
     return std::min(required, alone);
   }
   const bool enough = stops(shared, of_jerk);

@@ -11,9 +11,9 @@
 namespace sidestep {
 namespace {
 
-// Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
+// Braking deceleration that stands for zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
-constexpr double at_rest = 1e-6;  // [rad/s | m/s], or slower
+constexpr double at_rest = 1e-6;  // Speed of a joint that counts as rest [rad/s | m/s].
 
 /// Whether anything comes nearer that is lost already.
 bool lost_closes(const Clearances* clearances) noexcept {

@@ -8,10 +8,10 @@
 namespace sidestep {
 namespace {
 
-// A leaving speed that is missing comes by this many times the rate: see the header.
+// Rate at which a missing leaving speed is made up, in units of γ: see the header.
 constexpr double firmness = 3.0;
 
-/// The speed w with p(w) + delay w = room; with delay = 0 the inverse of p. Odd in the room.
+/// The speed w with p(w) + delay w = distance left; with delay = 0 the inverse of p. Odd in the distance.
 double profile_speed(double distance_left, double delay, double A, double rate) noexcept {
   const double size = std::abs(distance_left);
   double speed = size / (1.0 / rate + delay);
@@ -21,7 +21,7 @@ double profile_speed(double distance_left, double delay, double A, double rate) 
   return std::copysign(speed, distance_left);
 }
 
-/// p(u): the room that a closing speed needs.
+/// p(u): the distance that a closing speed needs.
 double distance_needed(double speed, double A, double rate) noexcept {
   const double size = std::abs(speed);
   return std::copysign(size > A / rate ? 0.5 * (size * size / A + A / (rate * rate)) : size / rate, speed);

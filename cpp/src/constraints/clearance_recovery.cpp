@@ -1,4 +1,4 @@
-// How clearances give way: to jerk limits, and to the way out of what is lost.
+// How clearances give way to jerk limits, and to the recovery of a lost clearance.
 #include <algorithm>
 
 #include "sidestep/constraints/clearance_constraints.hpp"
@@ -8,9 +8,9 @@
 namespace sidestep {
 namespace {
 
-// [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
+// Depth of a clearance that is not lost [m], so that its recovery ranks with that of lost ones: after what others must keep.
 constexpr double least_depth = 1e-6;
-// Share of its margin that a clearance keeps if it opposes the way out of a lost one.
+// Share of its margin that a clearance keeps if it opposes the way out of a lost one [-].
 constexpr double of_margin = 0.2;
 
 }  // namespace
@@ -20,7 +20,7 @@ bool ClearanceConstraints::relax_to_braking(double period, RowBlock& rows) noexc
   for (int row = 0; row < rows.size; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
     const double asked = rows.lower[row] * rows.lengths[row];
-    // Of what is known and not seen most of the margin is a reserve as well.
+    // Between links, which no sensor sees, most of the margin is a reserve as well.
     const double distance_left = reserve.distance_left + (reserve.seen ? 0.0 : (1.0 - of_margin) * reserve.margin);
     const auto fits = [&](double x) {
       const double slowing = x + reserve.curvature;

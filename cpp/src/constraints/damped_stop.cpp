@@ -8,7 +8,7 @@
 namespace sidestep {
 namespace {
 
-// Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
+// Damping of the stop for joints without an effort or a velocity limit to derive it from [Nm s/rad | N s/m].
 constexpr double unlimited_stop_damping = 1.0;
 
 /// Clips joint i's torque to what effort and rate leave, and names the limit.

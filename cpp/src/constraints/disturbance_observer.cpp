@@ -9,16 +9,17 @@
 namespace sidestep {
 namespace {
 
-constexpr double filter = 0.03;     // [s] time constant of all terms: far longer than a delay, which looks like inertia
-constexpr double memory = 3.0;      // [s] of motion
-constexpr double adoption = 0.05;   // [s] in which a new estimate is taken over
-constexpr double direction = 0.02;  // [rad/s | m/s] at which dry friction is three quarters of the whole
-constexpr double leap = 0.1;        // of the velocity limit, by which no model is wrong in a period [-]
-constexpr double least_leap = 0.1;  // [rad/s | m/s] the same, of slow joints: velocities are noisy
-constexpr double absurd = 1e9;      // [Nm | N] that is no measurement
-constexpr double explained = 0.8;   // of the missing force's variation that has to be explained [-]
-constexpr double largest = 0.1;     // of the effort limit, that a rotor takes at the acceleration limit [-]
-// Weights of the guesses of zero: of J and of p M_jj [(rad/s²)² s]; f, b and c.
+constexpr double filter = 0.03;     // Time constant of all terms [s]: far longer than a delay, which looks like inertia.
+constexpr double memory = 3.0;      // Duration of motion that counts [s].
+constexpr double adoption = 0.05;   // Time in which a new estimate is adopted [s].
+constexpr double direction = 0.02;  // Speed at which dry friction is three quarters of the whole [rad/s | m/s].
+// Change of velocity in a period that no model error explains, as a share of the velocity limit [-].
+constexpr double leap = 0.1;
+constexpr double least_leap = 0.1;  // The same for slow joints [rad/s | m/s]: velocities are noisy.
+constexpr double absurd = 1e9;      // Torque from which a value is no measurement [Nm | N].
+constexpr double explained = 0.8;   // Share of the missing torque's variation that an estimate must explain [-].
+constexpr double largest = 0.1;     // Largest share of the effort limit that a rotor takes at the acceleration limit [-].
+// Weights of the priors at zero: of J and of p M_jj [(rad/s²)² s]; of f, b and c.
 constexpr double of_rotor = 1.0, of_share = 2.0, of_rest = 0.01;
 
 }  // namespace

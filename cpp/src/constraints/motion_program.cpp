@@ -22,10 +22,10 @@
 namespace sidestep {
 namespace {
 
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();  // Value of what is unknown.
 
-// A mass matrix that differs from its transpose by more than this fraction of its largest entry is not rounding but
-// an error, for example a triangle that was never filled.
+// Asymmetry of a mass matrix that is rounding, relative to its largest entry: more is an error, for example a triangle that
+// was never filled.
 constexpr double symmetry_tolerance = 1e-6;
 
 Eigen::VectorXd expanded(const Eigen::VectorXd& weight, int num) {

@@ -8,8 +8,8 @@
 namespace sidestep {
 namespace {
 
-// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone, and are not granted. Those of
-// ways out are granted all the same: to avoid them, joints of no leverage would be flung about.
+// Largest shortfall that is not granted, relative to 1 /s^2 plus what is asked for: it may be due to the regularisation alone.
+// Shortfalls of recovery are granted all the same: to avoid them, joints of no leverage would be flung about.
 constexpr double shortfall_tolerance = 1e-4;
 
 }  // namespace

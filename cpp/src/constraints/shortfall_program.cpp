@@ -9,15 +9,16 @@
 namespace sidestep {
 namespace {
 
-// The smallest program of least shortfalls; the next ones double.
+// Rows of the smallest program of least shortfalls; the next ones double.
 constexpr int fewest_rows = 4;
-// The program of least shortfalls prefers small accelerations with this weight, so that there is one solution.
+// Weight of small accelerations in the program of least shortfalls, so that there is one solution.
 constexpr double regularisation = 1e-6;
-// That of the ways out of what is lost, which a joint of little leverage [rad/rad] is not to be flung about for.
+// The same for recovery, so that a joint of little leverage [rad/rad] is not flung about.
 constexpr double lost_regularisation = 1e-2;
-// ε: the shortfall of a clearance that the joints change by less than 5 cm/rad counts less [(m/rad)²].
+// Square ε of the gradient below which the shortfall of a clearance counts less [(m/rad)²]: joints change it by less than
+// 5 cm/rad.
 constexpr double least_gradient_squared = 0.05 * 0.05;
-// The least that a shortfall counts. A clearance of little leverage falls short by much: more would fling joints about.
+// Smallest weight of a shortfall. A clearance of little leverage falls short by much: more would fling joints about.
 constexpr double least_weight = 1e-9;
 
 double deepest_of(const ShortRows& short_rows) noexcept {

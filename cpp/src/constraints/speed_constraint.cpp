@@ -8,11 +8,11 @@
 namespace sidestep {
 namespace {
 
-constexpr double aimed = 0.98;           // of a limit
-constexpr double decay = 50.0;           // k [1/s]
-constexpr double most_per_period = 0.5;  // of what is left, and of an excess
-constexpr double slowest = 1e-3;         // [m/s] of frames whose direction means something
-constexpr double shortest = 1e-6;        // [m/rad]
+constexpr double aimed = 0.98;           // Share of a limit that is aimed at [-], see the header.
+constexpr double decay = 50.0;           // Rate k [1/s].
+constexpr double most_per_period = 0.5;  // Largest share of the difference to the limit that a period removes [-].
+constexpr double slowest = 1e-3;         // Slowest speed of a frame with a usable direction [m/s].
+constexpr double shortest = 1e-6;        // Shortest gradient that counts [m/rad].
 
 struct PlaceMotion {
   Eigen::Vector3d p, p_dot;

@@ -2,11 +2,11 @@
 
 namespace sidestep {
 
-/// Slack below this, relative to 1 /s² plus the bound, is rounding and not worth a status.
+/// Slack that is rounding and not worth a status, relative to 1 /s² plus the bound.
 inline constexpr double slack_tolerance = 1e-9;
-/// [m/rad] A gradient shorter than this is one that no joint can change.
+/// Shortest gradient that joints can change [m/rad].
 inline constexpr double shortest_gradient = 1e-6;
-/// [m/s] What closes no faster does not close: rounding, or a clearance that joints hardly change.
+/// Closing speed that does not count [m/s]: rounding, or a clearance that joints hardly change.
 inline constexpr double creeping = 1e-4;
 
 }  // namespace sidestep

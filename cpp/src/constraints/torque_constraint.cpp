@@ -7,8 +7,7 @@
 namespace sidestep {
 namespace {
 
-// The torque of a solved program is outside the effort limits by rounding at most; more than this fraction of the
-// limit means that the solution is not one.
+// Excess of an effort limit that is rounding, as a fraction of the limit: a program with more is not solved.
 constexpr double torque_tolerance = 1e-6;
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace sidestep {
 
 double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits) noexcept {
-  // |M j| T <= share of the rate: what is left is for the change of the bias.
+  // Share of the rate for |M j| T [-]: the rest is for the change of the bias.
   constexpr double of_rate = 0.8;
   double share = 1.0;
   for (Eigen::Index i = 0; i < mass.rows(); ++i) {

@@ -14,9 +14,9 @@
 namespace sidestep {
 namespace {
 
-constexpr int most_threads = 1024;
-constexpr std::chrono::milliseconds nap{10};  // between two looks for an interruption, while other threads work
-constexpr double most_record_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;
+constexpr int most_threads = 1024;            // Largest number of threads that may be asked for.
+constexpr std::chrono::milliseconds nap{10};  // Time between two checks for an interruption while other threads work.
+constexpr double most_record_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;  // Largest memory that one record may take [B].
 
 }  // namespace
 
@@ -35,7 +35,7 @@ void share(Eigen::Index num, int threads, const Interrupted& interrupted,
   std::atomic<bool> stopped{false};
   std::exception_ptr error;
   std::size_t ended = 0;
-  std::mutex mutex;  // of the two above
+  std::mutex mutex;  // Guards `error` and `ended`.
   std::condition_variable end;
   const auto run = [&](const Interrupted& halted) {
     try {

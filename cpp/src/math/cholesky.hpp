@@ -11,7 +11,7 @@ namespace sidestep {
 /// reading A's lower triangle. False if A is not positive definite to working precision. Allocates nothing at any size,
 /// which Eigen's blocked factorisation does not promise.
 inline bool cholesky(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& A, Eigen::MatrixXd& L) noexcept {
-  // A pivot below this fraction of its diagonal entry is all cancellation.
+  // Smallest pivot, as a fraction of its diagonal entry: below it all is cancellation.
   constexpr double singular = 1e-14;
   return with_size(A.rows(), [&](auto n) {
     for (Eigen::Index j = 0; j < n; ++j) {

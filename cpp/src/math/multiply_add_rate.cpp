@@ -10,7 +10,7 @@
 namespace sidestep {
 namespace {
 
-constexpr long rounds = 10'000;  // of a run: some hundred microseconds
+constexpr long rounds = 10'000;  // Rounds of one measurement: some hundred microseconds.
 
 int multiply_add(double& result) noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::multiply_add)(rounds, result); }
 

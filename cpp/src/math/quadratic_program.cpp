@@ -12,12 +12,13 @@
 namespace sidestep {
 namespace {
 
-// A constraint counts as violated beyond this fraction of the terms that cancel in it: about 1e4 roundings, which is
-// what factors of ill-conditioned but usable data lose.
+// Violation of a constraint that still counts as rounding, as a fraction of the terms that cancel in it: about 1e4
+// roundings, which is what factors of ill-conditioned but usable data lose.
 constexpr double feasibility_tolerance = 1e-12;
-// A normal counts as a combination of the active ones when the part that is not, is below this fraction of it.
+// Independent part of a normal, as a fraction of it, below which it counts as a combination of the active normals.
 constexpr double dependence_tolerance = 1e-11;
-// Each constraint is added and dropped a few times at most in practice; this bounds the time of a hopeless case.
+// Iterations allowed per constraint. In practice each is added and dropped a few times at most; this bounds the time of a
+// hopeless case.
 constexpr int iterations_per_constraint = 10;
 
 /// Whether lower <= upper everywhere, without NaN and without a bound at its own infinity.
@@ -188,7 +189,7 @@ double QuadraticProgram::energy_norm(const QuadraticProgramData& data) const noe
 }
 
 double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& constraint, double& sign) const noexcept {
-  double worst = 0.0, size = -1.0;  // √(x' H x), once it is asked for
+  double worst = 0.0, size = -1.0;  // Largest violation so far, and √(x' H x) once it is needed.
   for (int i = 0; i < n_ + m_; ++i) {
     if (is_active_[static_cast<std::size_t>(i)]) {
       continue;

@@ -7,9 +7,9 @@
 namespace sidestep {
 namespace {
 
-constexpr double share_of_limits = 0.9;
-constexpr double unlimited_acceleration = 100.0;  // stands for the limit of joints without one [/s²]
-constexpr double frequency = 10.0;                // ω [1/s]
+constexpr double share_of_limits = 0.9;  // Share of the limits that a trajectory uses [-]: the rest is for following it.
+constexpr double unlimited_acceleration = 100.0;  // Acceleration bound of joints without a limit [/s²].
+constexpr double frequency = 10.0;                // Frequency ω of the feedback [1/s].
 
 }  // namespace
 

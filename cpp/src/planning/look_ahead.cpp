@@ -17,15 +17,16 @@ namespace {
 // How far each joint of a target may be from the arm's [rad | m], in turn; while a trajectory is followed, of every
 // other one from its target.
 constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
-constexpr double spread_of_followed = 0.5;
-constexpr double coarse_period = 0.05;  // [s] of the steps by which trajectories are compared at first
-constexpr double least_steps = 10.0;    // of a coarse motion, where the fine ones have as many
-// Deeper than bodies overshoot [m]: how a motion goes on from there is not looked at. Of such the longest is the best.
+constexpr double spread_of_followed = 0.5;  // Spread around the target of the followed trajectory [rad | m].
+constexpr double coarse_period = 0.05;      // Time step in which trajectories are compared at first [s].
+constexpr double least_steps = 10.0;        // Fewest steps of a coarse motion, if fine ones have as many.
+// Clearance below which bodies do not overshoot [m]: the motion is not predicted beyond. Of such motions the longest is the best.
 constexpr double touched = -0.02;
-constexpr std::size_t enough_references = 10;  // that go far: the others are sorted out only while there are more
-// coarse motions in one look: so many to the horizon, more if they end before
+// Number of far-reaching references that suffice: others are rejected only while there are more.
+constexpr std::size_t enough_references = 10;
+// Coarse motions of one look, if each lasts up to the horizon; more if they end before.
 constexpr int coarse_horizons = 25;
-constexpr std::size_t num_fine = 4;  // fine ones of trajectories, at most
+constexpr std::size_t num_fine = 4;  // Most trajectories that are integrated finely.
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
   if (system == nullptr) {
@@ -39,7 +40,7 @@ const LookAheadSettings& validated(const LookAheadSettings& settings) {
   return settings;
 }
 
-constexpr double rounding = 1e-6;
+constexpr double rounding = 1e-6;  // Rounding of a quotient of durations.
 
 int whole_periods(double duration, double period) noexcept {
   return std::max(1, static_cast<int>(std::lround(duration / period)));
@@ -244,7 +245,7 @@ std::vector<AvoidanceTrajectory> LookAhead::draw_flights(const Motion& now,
                                                          const std::optional<AvoidanceTrajectory>& followed) {
   struct Reference {
     AvoidanceTrajectory flight, moved;
-    int free = 0;  // steps
+    int free = 0;  // Steps without contact.
   };
   std::vector<Reference> references;
   references.reserve(static_cast<std::size_t>(settings_.tries));

@@ -9,8 +9,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double disturbing = 0.1;  // [m] from the arm of what moves
-constexpr double foresight = 1.0;   // [s] in which it could be
+constexpr double disturbing = 0.1;  // Distance of something moving from the arm that counts as a disturbance [m].
+constexpr double foresight = 1.0;   // Time in which it could come that close [s].
 
 }  // namespace
 

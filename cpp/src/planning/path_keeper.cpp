@@ -8,11 +8,12 @@
 namespace sidestep {
 namespace {
 
-constexpr double widening = 1.5;        // the margin grows by this factor each time the arm was stuck
-constexpr int widenings = 4;            // and begins anew after so many
-constexpr double shorter = 0.9;         // a straight way is shorter than the rest of a path by this factor to let go of it
-constexpr double progress_share = 0.5;  // of the way that a route makes within the patience, that the arm must make
-constexpr double back = 0.05;           // between places behind the reference where an arm may find back to its path [rad]
+constexpr double widening = 1.5;  // Factor on the margin each time that the arm was stuck.
+constexpr int widenings = 4;      // Number of times after which the margin starts anew.
+// Length of a straight way, as a share of the rest of the path, below which it replaces the path [-].
+constexpr double shorter = 0.9;
+constexpr double progress_share = 0.5;  // Share of the route's progress within the patience that the arm must make [-].
+constexpr double back = 0.05;           // Distance of places behind the reference where an arm may rejoin its path [rad].
 
 }  // namespace
 
@@ -37,7 +38,7 @@ void PathKeeper::update_to_newest() {
     return;
   }
   newer_ = false;
-  const State state = exchange_.states.get();  // a copy: newer ones come while it looks
+  const State state = exchange_.states.get();  // Copy of the newest state: newer ones arrive while it is checked.
   update(state);
   exchange_.looked.draft() = {state.time,
                               std::chrono::duration<double>(std::chrono::steady_clock::now() - state.written).count()};

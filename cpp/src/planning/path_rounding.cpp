@@ -6,11 +6,12 @@
 namespace sidestep {
 namespace {
 
-constexpr double shortest = 1e-9;   // edge [rad]
-constexpr double deviation = 5e-4;  // of any point of the arm from chords, and from a corner that is not free [m]
-constexpr double straight = 1e-9;   // change of direction that is none
-constexpr int most_chords = 64;
-constexpr int pieces = 16;  // of a rounding at least, among the stations
+constexpr double shortest = 1e-9;  // Length of an edge that counts as none [rad].
+// Largest deviation of any point of the arm from chords, and from a corner that is not free [m].
+constexpr double deviation = 5e-4;
+constexpr double straight = 1e-9;  // Change of direction that counts as none [rad].
+constexpr int most_chords = 64;    // Most chords of a corner.
+constexpr int pieces = 16;         // Fewest pieces of a rounding between stations.
 
 }  // namespace
 

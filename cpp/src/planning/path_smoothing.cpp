@@ -10,7 +10,7 @@ namespace {
 
 using Waypoints = std::vector<Eigen::VectorXd>;
 
-constexpr double slow_share = 0.5;  // of the median velocity limit, below which a joint counts as slow
+constexpr double slow_share = 0.5;  // Velocity limit below which a joint counts as slow, as a share of the median [-].
 
 /// From every waypoint on to the farthest that can be seen from it.
 Waypoints skip(const Waypoints& path, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
@@ -49,12 +49,12 @@ std::vector<double> stations(const Waypoints& path, const Eigen::VectorXd& slown
   return at;
 }
 
-constexpr double sample = 0.1;    // between clearances on an edge [rad]
-constexpr double shift = 0.3;     // that a waypoint is shifted at a time [rad]
-constexpr int shifts = 8;         // tried for a waypoint
-constexpr double slowest = 0.25;  // share of the speed that is left where there is no clearance
-constexpr int misses = 3;         // share of the attempts to shorten that may fail in a row: one in three
-constexpr double gain = 1e-3;     // a length below which a shortcut is not worth a check [rad]
+constexpr double sample = 0.1;    // Distance between clearances on an edge [rad].
+constexpr double shift = 0.3;     // Largest shift of a waypoint at a time [rad].
+constexpr int shifts = 8;         // Shifts tried per waypoint.
+constexpr double slowest = 0.25;  // Share of the speed that is left where there is no clearance [-].
+constexpr int misses = 3;         // Attempts to shorten of which one may fail in a row.
+constexpr double gain = 1e-3;     // Smallest reduction of length that is worth a check [rad].
 
 /// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
 double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness, const ClearanceQuery& body,

@@ -9,12 +9,12 @@
 namespace sidestep {
 namespace {
 
-constexpr int halvings = 40;  // of an interval of x
-constexpr int most_rounds = 8;
-constexpr double crawl = 1e-4;                     // least x, so that time is finite
-constexpr double longest = 0.004, finest = 0.001;  // between samples [s]
-constexpr int per_window = 5;
-constexpr double most_samples = 20'000;
+constexpr int halvings = 40;                       // Halvings of an interval of x.
+constexpr int most_rounds = 8;                     // Most rounds in which acceleration shares are reduced.
+constexpr double crawl = 1e-4;                     // Smallest x, so that time is finite.
+constexpr double longest = 0.004, finest = 0.001;  // Longest and shortest sampling period [s].
+constexpr int per_window = 5;                      // Samples per window.
+constexpr double most_samples = 20'000;            // Largest number of samples.
 
 /// The passes over stations.
 class Passes {

@@ -16,13 +16,14 @@ namespace sidestep {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double slack_share = 0.25;  // of a margin: proofs of edges along it cost as much the less slack they have
-constexpr double local = 0.3;         // of the samples are around a node: narrow places are near others
-constexpr double around_node = 2.4;   // how far each joint of such a sample may be from the node's [rad | m]
-constexpr double octaves = 2.5;       // of the lengths of steps from a node that was trapped, below the range
-constexpr double domain = 3.0;        // of the range: how far samples may be from a node that was trapped
-constexpr int draws = 32;             // of a sample until one is within the domain of the node nearest to it
-constexpr double touching = 1e-6;     // [m] below what an end has: rounding when it is asked for again
+// Slack as a share of the margin [-]: the less slack, the more the proof of an edge along it costs.
+constexpr double slack_share = 0.25;
+constexpr double local = 0.3;        // Share of the samples that are around a node [-]: narrow places are near others.
+constexpr double around_node = 2.4;  // Largest distance of each joint of such a sample from the node's [rad | m].
+constexpr double octaves = 2.5;      // Octaves of step lengths below the range, from a node that was trapped.
+constexpr double domain = 3.0;       // Largest distance of samples from a trapped node, in ranges.
+constexpr int draws = 32;            // Most draws of a sample until one is within the domain of its nearest node.
+constexpr double touching = 1e-6;    // Deficit that is added at an end [m]: rounding when it is asked for again.
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 

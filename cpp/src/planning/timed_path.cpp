@@ -9,19 +9,22 @@
 namespace sidestep {
 namespace {
 
-constexpr double spacing = 0.05;               // of places [rad]
-constexpr double fine = 0.01;                  // of stations [rad]
-constexpr double seen = 0.1;                   // clearance from which it bounds no speed [m]
-constexpr double least_distance_left = 0.001;  // [m]
-constexpr double left_to_the_arm = 0.95;       // of the limits
-constexpr double unmeasured = 0.35;            // of the limits
-constexpr double of_closing = 0.8;             // of the speed at which a clearance may close: rows that bind are not smooth
-constexpr double at_samples = 0.88;            // of the jerk: between samples it is up to an eighth more
-constexpr double of_effort = 0.7, of_effort_rate = 0.5;  // for motion along the path: the rest is for feedback, and clearances
-constexpr double least_share = 0.05;                     // of the acceleration limits, where gravity takes the effort
+constexpr double spacing = 0.05;               // Distance between places [rad].
+constexpr double fine = 0.01;                  // Distance between stations [rad].
+constexpr double seen = 0.1;                   // Clearance from which it bounds no speed [m].
+constexpr double least_distance_left = 0.001;  // Smallest distance left that bounds the speed [m].
+constexpr double left_to_the_arm = 0.95;       // Share of the limits for the path [-]: the rest is for the arm that follows.
+constexpr double unmeasured = 0.35;            // Share of the limits for a path whose clearances are not measured [-].
+// Share of the allowed closing speed [-]: constraints that bind make the motion less smooth.
+constexpr double of_closing = 0.8;
+constexpr double at_samples = 0.88;  // Share of the jerk limit at samples [-]: in between it is up to an eighth more.
+// Shares of effort and of its rate for motion along the path [-]: the rest is for feedback and clearances.
+constexpr double of_effort = 0.7, of_effort_rate = 0.5;
+constexpr double least_share = 0.05;  // Smallest share of the acceleration limits [-], where gravity takes the effort.
+// Velocity [/s] and acceleration [/s²] of joints without a limit.
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
-constexpr double stopping =
-    1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
+constexpr double stopping =  // Longest braking distance of a joint [rad | m]: beyond, no clearance can be foreseen.
+    1.5;                     // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
 
 /// p⁻¹ of ClearanceConstraints: the speed [m/s] at which a clearance with this distance left may close.
 double closing_speed(double distance_left, double A, double rate) {

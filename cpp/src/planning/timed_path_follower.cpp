@@ -6,9 +6,9 @@
 namespace sidestep {
 namespace {
 
-constexpr double first = 1.0;  // part of the path on which an arm that moved while the route was made enters it [rad]
-constexpr double stiffness = 400.0, damping = 40.0;  // of the pace
-constexpr double most_change = 10.0;                 // of the pace [1/s]
+constexpr double first = 1.0;  // Part of the path where an arm that moved while the route was computed may enter it [rad].
+constexpr double stiffness = 400.0, damping = 40.0;  // Gains of the pace [1/s², 1/s].
+constexpr double most_change = 10.0;                 // Largest change of the pace [1/s].
 
 }  // namespace
 

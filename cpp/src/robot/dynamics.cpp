@@ -9,9 +9,10 @@
 namespace sidestep {
 namespace {
 
-// relative to the largest entry: files give a few digits, and bodies are thin
+// Asymmetry, or negative eigenvalue, of an inertia that is accepted, relative to the largest entry: files give a few digits, and bodies
+// are thin.
 constexpr double inertia_tolerance = 1e-6;
-// [kg m^2] per kilogram, of a kilogram at least: zeros of CAD exports and sums
+// Absolute tolerance per kilogram, of one kilogram at least [kg m^2]: zeros of CAD exports, and sums.
 constexpr double inertia_rounding = 1e-12;
 
 /// The inertia of a point mass about the origin, m (|c|² 1 - c cᵀ).

@@ -9,8 +9,9 @@
 namespace sidestep {
 namespace {
 
-constexpr double unit_axis_tolerance = 1e-9;       // rounding of a normalised double vector, with margin
-constexpr double orthonormality_tolerance = 1e-9;  // the same for a rotation matrix built from angles
+// Deviation of an axis from unit length: rounding of a normalised double vector, with margin.
+constexpr double unit_axis_tolerance = 1e-9;
+constexpr double orthonormality_tolerance = 1e-9;  // Deviation of a rotation matrix built from angles: rounding, with margin.
 
 void check_placement(const Eigen::Isometry3d& X, const std::string& owner) {
   const Eigen::Matrix3d R = X.linear();

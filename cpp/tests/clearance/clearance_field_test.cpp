@@ -141,7 +141,7 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
                  tolerance / temperature * (1.0 / temperature + std::abs(expected.curvature)));
       BOOST_TEST((found.gradients.col(k) - gradient).norm() <= tolerance / temperature * (1.0 + gradient.norm()));
     }
-    // Of samples whose room after a stop is below the reach, all that weigh are looked at.
+    // Of samples whose clearance after a stop is below the reach, all that weigh are looked at.
     const ClearanceSample approach = ahead.result();
     if (after(approach) + ClearanceField::window_ahead * temperature < reach) {
       Eigen::VectorXd turned = Eigen::VectorXd::Zero(robot.num_coordinates());

@@ -382,7 +382,7 @@ BOOST_AUTO_TEST_CASE(what_moves_is_nearer_than_it_is_said_to_be) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
+BOOST_AUTO_TEST_CASE(distance_left_is_what_the_least_clearance_has_beyond_its_floor) {
   Random random(11);
   for (int trial = 0; trial < 60; ++trial) {
     const Robot robot = test::random_tree(random, 6);
@@ -392,7 +392,7 @@ BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
     const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd floors = 0.05 * random.vector(checked.num_items());
     Eigen::VectorXd clearances(checked.num_items());
-    constexpr double cap = 0.5, far = 1.0;  // the room is never more than the cap, whatever the floors
+    constexpr double cap = 0.5, far = 1.0;  // the distance left is never more than the cap, whatever the floors
     checked.clearances(q, obstacles, far, w, clearances);
     const double least = std::min(cap, (clearances - floors).minCoeff());
     const double distance_left = checked.distance_left(q, obstacles, floors, cap, cap, w);

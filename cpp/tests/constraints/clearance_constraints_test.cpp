@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(the_margin_is_kept_for_ever_and_without_hurry) {
 }
 
 BOOST_AUTO_TEST_CASE(the_margin_is_reached) {
-  // What is kept is the margin, not more: pushed on, the room shrinks with the time constant 1/rate.
+  // What is kept is the margin, not more: pushed on, the distance left shrinks with the time constant 1/rate.
   const ClosingLimits limits{2.0, 4.0, 20.0, 0.5};
   double distance_left = 0.3, closing = 0.0;
   for (int k = 0; k < 2000; ++k) {
@@ -301,7 +301,7 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   };
   BOOST_TEST((way(least) <= 0.0107 && way(least - 0.01) > 0.0107));
 
-  // Without room and without closing the way back asks for what jerk allows; as a reserve, for nothing.
+  // At the margin and without closing, recovery asks for what jerk allows; as a reserve, for nothing.
   ask(-0.03, 0.0, 0.0);
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(rows.relax_to_braking(0.001));
@@ -319,7 +319,7 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   BOOST_TEST((rows.lower[1] == back && rows.depths[0] == 0.0 && rows.depths[1] > 0.0));
   BOOST_TEST(rows.normals(1, 0) == rows.normals(0, 0));
 
-  // What closes in without room has no reserve, nor has what the arm's own stop does not stop.
+  // What closes without a distance left has no reserve, nor has what the arm's own stop does not stop.
   ask(-0.003, 0.1, 0.1);
   BOOST_TEST(!rows.relax_to_braking(0.001));
   ask(0.022, 0.4, 0.0);
@@ -538,7 +538,7 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   for (int row : {0, 1}) {
     BOOST_TEST(rows.normals.row(row).dot(-hardness / 0.2 * v.transpose()) == rows.lower[row], close);
   }
-  // Where the room is all but gone the stop is no harder than twice what meets the demand,
+  // Where the distance is all but used up the stop is no harder than twice what meets the demand,
   update(1e-9, 0.4, -20.0);
   BOOST_REQUIRE(rows.size == 2);
   BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -20.0), close);
@@ -563,7 +563,7 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   BOOST_REQUIRE(rows.size == 1);
   BOOST_TEST(rows.lower[0] <= 14.0);
 
-  // Without room for one more row the least critical one gives way.
+  // If all rows are in use, the least critical one gives way.
   SafetySettings single;
   single.max_rows = 1;
   Rows one(2, single);

@@ -20,27 +20,27 @@ namespace sidestep {
 /// What is proven and measured of the ellipsoids that cover one link.
 struct CoverProof {
   std::string link;
-  double coverage = 0.0;           ///< share of the mesh's area proven to lie inside the ellipsoids, 1 of a cover
-  double mean_overshoot = 0.0;     ///< mean distance of the ellipsoids' outer surface from the mesh [m]
-  double max_overshoot = 0.0;      ///< the largest [m]
-  double volume_ratio = 0.0;       ///< volume of the ellipsoids over that of the mesh or of its convex hull
-  std::string volume_of;           ///< which of the two: "mesh" or "hull"
-  double interior_coverage = 0.0;  ///< share of the link's inside that lies in the ellipsoids
-  double slimness = 0.0;           ///< the least ratio of shortest to longest semi-axis
+  double coverage = 0.0;           ///< Share of the mesh's area proven to lie inside the ellipsoids; 1 for a cover.
+  double mean_overshoot = 0.0;     ///< Mean distance of the ellipsoids' outer surface from the mesh [m].
+  double max_overshoot = 0.0;      ///< Largest distance of that surface from the mesh [m].
+  double volume_ratio = 0.0;       ///< Volume of the ellipsoids over that of the mesh or of its convex hull.
+  std::string volume_of;           ///< Reference of `volume_ratio`: "mesh" or "hull".
+  double interior_coverage = 0.0;  ///< Share of the link's inside that lies in the ellipsoids.
+  double slimness = 0.0;           ///< Least ratio of shortest to longest semi-axis.
 };
 
 /// Where an arm comes from. Does not count for its content hash.
 struct Provenance {
-  std::string source;            ///< name of the description: a file name or a shipped robot
-  std::string fingerprint;       ///< hash of kinematics and meshes that the body was made from
-  std::string sidestep_version;  ///< that prepared it
-  std::string date;              ///< of the preparation, ISO 8601
+  std::string source;            ///< Name of the description: a file name or a shipped robot.
+  std::string fingerprint;       ///< Hash of the kinematics and meshes that the body was made from.
+  std::string sidestep_version;  ///< Version that prepared it.
+  std::string date;              ///< Date of the preparation, ISO 8601.
 };
 
 /// What an arm knows besides the quantities that control needs.
 struct ArmDetails {
-  std::vector<CoverProof> proof;                                   ///< one per covered link
-  std::vector<std::pair<std::string, std::string>> allowed_pairs;  ///< links that may touch
+  std::vector<CoverProof> proof;                                   ///< One proof per covered link.
+  std::vector<std::pair<std::string, std::string>> allowed_pairs;  ///< Pairs of links that may touch.
   Provenance provenance;
 };
 

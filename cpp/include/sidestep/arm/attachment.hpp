@@ -14,15 +14,15 @@ namespace sidestep {
 /// An object that a link holds: a tool, something grasped. It is part of the arm: it keeps off obstacles and off the links
 /// that another joint moves, and its mass counts.
 struct Attachment {
-  std::string name;                                        ///< of its frame, which no other frame may have
-  std::string link;                                        ///< that holds it
-  Eigen::Isometry3d X_LA = Eigen::Isometry3d::Identity();  ///< its pose in the link's frame
-  SolidEllipsoids cover;                                   ///< ellipsoids that hold all of it, in its own frame
-  Inertial inertial;                                       ///< in its own frame; mass 0: unknown, or none
-  std::vector<std::string> may_touch;                      ///< links that get no clearance from it, as the fingers
-  std::vector<std::string> rests_on;  ///< names of obstacles that it stands on, until it is lifted; or `anything`
+  std::string name;                                        ///< Name of its frame, which no other frame may have.
+  std::string link;                                        ///< Link that holds it.
+  Eigen::Isometry3d X_LA = Eigen::Isometry3d::Identity();  ///< Its pose in the link's frame.
+  SolidEllipsoids cover;                                   ///< Ellipsoids that hold all of it, in its own frame.
+  Inertial inertial;                                       ///< Mass properties in its own frame; mass 0: unknown, or none.
+  std::vector<std::string> may_touch;                      ///< Links that get no clearance from it, such as the fingers.
+  std::vector<std::string> rests_on;  ///< Names of obstacles that it stands on until it is lifted; or `anything`.
 
-  static constexpr const char* anything = "*";
+  static constexpr const char* anything = "*";  // Stands in `rests_on` for every obstacle.
 };
 
 /// The arm with an object attached: a frame, ellipsoids, pairs with every covered link that another joint moves, and its inertia
@@ -38,12 +38,13 @@ Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = 
 /// and its pose, read in the world's frame, puts it to them at q (nv), where that is not empty.
 std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q = {});
 
+// Slack of an attached object towards what it overlaps or rests on when it is attached [m].
 constexpr double attached_distance = 0.001;
 
 /// An object that stands on something, and by how much its cover has given way there.
 struct RestingObject {
   Attachment object;
-  /// The whole of an ellipsoid of the cover is within this distance of what is left of it [m], one per ellipsoid.
+  /// Largest distance of the whole ellipsoid from what is left of it [m], one per ellipsoid of the cover.
   std::vector<double> given;
 };
 
@@ -55,6 +56,6 @@ struct RestingObject {
 RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
                       double distance);
 
-constexpr double deepest_rest = 0.03;
+constexpr double deepest_rest = 0.03;  // Largest depth in an obstacle that counts as standing on it [m].
 
 }  // namespace sidestep

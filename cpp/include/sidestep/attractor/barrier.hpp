@@ -29,11 +29,11 @@ class Barrier : public Embedding {
   void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept final { activations = activations_; }
   void lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept final;
 
-  /// Share of a clearance at the goal that remains of the activation distance there.
+  /// Share of a clearance at the goal that the activation distance there is reduced to [-].
   static constexpr double relaxed_share = 0.9;
-  /// No activation distance is made shorter than this many floors of the barrier function.
+  /// Shortest activation distance, in floors of the barrier function.
   static constexpr double relaxed_floors = 2.0;
-  /// No more of an activation distance is kept as a safety margin, of what is not seen.
+  /// Largest share of an activation distance that is kept as a safety margin by what no sensor sees [-].
   static constexpr double margin_share = ClearanceGroup::margin_share;
 
  protected:

@@ -12,13 +12,13 @@ namespace sidestep {
 /// inside the barrier. power = 2 makes the geodesic acceleration continuous at the activation distance, power = 3 also
 /// its derivative; power = 1 would let it jump.
 struct BarrierFunction {
-  double activation;  ///< where the barrier begins: larger reacts earlier and gentler, and closes narrow passages
-  double strength;    ///< larger turns the motion away earlier within the activation distance
-  double power;       ///< larger stays flat longer and rises steeper
-  double floor;       ///< smallest clearance the formula is used at
+  double activation;  ///< Clearance where the barrier begins: larger reacts earlier and gentler, and closes narrow passages.
+  double strength;    ///< Strength: larger turns the motion away earlier within the activation distance.
+  double power;       ///< Exponent: larger stays flat longer and rises steeper.
+  double floor;       ///< Smallest clearance at which the formula is used.
 
   struct Value {
-    double value, first, second;  ///< ψ, dψ/dh, d²ψ/dh²
+    double value, first, second;  ///< ψ, dψ/dh, d²ψ/dh².
   };
 
   Value operator()(double h) const noexcept {

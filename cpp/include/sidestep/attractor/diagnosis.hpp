@@ -24,13 +24,14 @@ const char* name(MotionState state) noexcept;
 
 /// What counts as what; the same for every robot and scene.
 namespace judgement {
-constexpr double arrived_joint = 0.05;     // [rad | m] as everywhere in this project
-constexpr double arrived_position = 0.01;  // [m]
-constexpr double arrived_rotation = 0.05;  // [rad]
-constexpr double slow = 0.02;              // |v| [rad/s]: at rest, but for what creeps
-constexpr double held = 0.05;              // share of the goal's pull that is left where an arm is stuck
-constexpr double vanished = 0.0025;        // |∂U| [rad/s²] that is none: a tenth of that of K = 0.5 at arrived_joint
-constexpr double noticed = 0.05;           // share of the pull that has to be blocked to be called sliding
+constexpr double arrived_joint = 0.05;     // Largest joint error at the goal [rad | m], as everywhere in this project.
+constexpr double arrived_position = 0.01;  // Largest position error at the goal [m].
+constexpr double arrived_rotation = 0.05;  // Largest rotation error at the goal [rad].
+constexpr double slow = 0.02;              // Speed |v| below which an arm counts as at rest [rad/s].
+constexpr double held = 0.05;              // Share of the goal's acceleration that is left where an arm counts as stuck [-].
+// Desired acceleration |∂U| that counts as none [rad/s²]: a tenth of that of K = 0.5 at arrived_joint.
+constexpr double vanished = 0.0025;
+constexpr double noticed = 0.05;  // Blocked share of the desired acceleration from which the arm counts as sliding [-].
 }  // namespace judgement
 
 /// Why a motion is what it is, from one step alone.
@@ -48,15 +49,15 @@ constexpr double noticed = 0.05;           // share of the pull that has to be b
 /// ProgressMonitor.
 struct Diagnosis {
   MotionState state = MotionState::fallback;
-  int coordinate = -1;  ///< the dominating embedding coordinate, see GeometricSystem::labels; -1: none
-  int point = -1;       ///< its nearest obstacle point; -1: none
-  double clearance = std::numeric_limits<double>::infinity();  ///< of it [m | rad], where it has one
-  double share = 0.0;    ///< its share of what is held back; of several opposed ones it can exceed 1
-  double blocked = 0.0;  ///< 1 − |G⁻¹ ∂U| / |∂U|, the part of the goal's pull that is held back
-  double speed = 0.0;    ///< |v| [rad/s]
+  int coordinate = -1;  ///< Dominating embedding coordinate, see GeometricSystem::labels; -1: none.
+  int point = -1;       ///< Its nearest obstacle point; -1: none.
+  double clearance = std::numeric_limits<double>::infinity();  ///< Its clearance [m | rad], where it has one.
+  double share = 0.0;    ///< Its share of what is held back; of several opposed ones it can exceed 1.
+  double blocked = 0.0;  ///< Share of the desired acceleration that is held back, 1 − |G⁻¹ ∂U| / |∂U| [-].
+  double speed = 0.0;    ///< |v| [rad/s].
   // How far the goal is, as in GoalPotential; NaN where it has no such part.
   double joint_error = nan, position_error = nan, rotation_error = nan;
-  bool prismatic = false;  ///< the joint of `joint_error` is prismatic, so that it is in m
+  bool prismatic = false;  ///< Whether the joint of `joint_error` is prismatic, so that the error is in m.
 
   /// How far the goal is, for example "0.31 rad", "12.0 mm" or "12.0 mm and 0.31 rad".
   std::string way_left() const;

@@ -16,13 +16,13 @@ namespace sidestep {
 
 /// Where an embedding adds its m coordinates ψ, their gradients and their curvatures.
 struct EmbeddingView {
-  Eigen::Map<Eigen::VectorXd> values;               ///< ψ (m)
-  Eigen::Map<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
-  Eigen::Map<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
-  ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
+  Eigen::Map<Eigen::VectorXd> values;               ///< Coordinates ψ (m).
+  Eigen::Map<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m).
+  Eigen::Map<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m).
+  ClearanceView clearances;                         ///< Clearances of barriers; other embeddings leave them as they are.
   /// Activation distances (m) in place of the embedding's own, see Barrier; empty: its own.
   Eigen::Map<const Eigen::VectorXd> activations{nullptr, 0};
-  double horizon = 0.0;  ///< τ [s] at least by which obstacles that approach are looked for, see Horizon
+  double horizon = 0.0;  ///< Least time τ [s] within which approaching obstacles count, see Horizon.
 };
 
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).

@@ -22,12 +22,12 @@ enum class DampingForm { plain, metric };
 enum class PullForm { metric, one_sided };
 
 struct GeometricSystemSettings {
-  Eigen::MatrixXd stiffness;  ///< K (nv × nv) [1/s²], symmetric positive semi-definite
-  Eigen::MatrixXd damping;    ///< D (nv × nv) [1/s], the same
+  Eigen::MatrixXd stiffness;  ///< K (nv × nv) [1/s²], symmetric positive semi-definite.
+  Eigen::MatrixXd damping;    ///< D (nv × nv) [1/s], symmetric positive semi-definite.
   DampingForm damping_form = DampingForm::plain;
   Switch combination = Unswitched{};
-  double fallback_rate = 10.0;        ///< [1/s] the damped stop of the fallback is q̈ = −rate v
-  PenetrationRecovery recovery = {};  ///< what a barrier does with an arm inside it
+  double fallback_rate = 10.0;        ///< Rate of the fallback's damped stop, q̈ = −rate v [1/s].
+  PenetrationRecovery recovery = {};  ///< Recovery of an arm that is inside a barrier.
   PullForm pull_form = PullForm::metric;
 };
 
@@ -66,20 +66,20 @@ class GeometricSystem {
    public:
     explicit Workspace(const GeometricSystem& system);
 
-    Eigen::VectorXd acceleration;         ///< a (nv) [rad/s²]
-    Eigen::VectorXd harmonic, geodesic;   ///< h and g (nv) [rad/s²]
-    Eigen::VectorXd attraction;           ///< −G⁻¹ ∂U (nv) [rad/s²]: what the metric lets through of the goal's pull
-    Eigen::VectorXd recovery;             ///< the push out of barriers (nv) [rad/s²]; zero outside
-    int inside = -1;                      ///< the coordinate deepest below its floor; -1: none
-    Eigen::VectorXd switch_weights;       ///< s (nv): 1 is harmonic
-    Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m)
+    Eigen::VectorXd acceleration;         ///< Acceleration a (nv) [rad/s²].
+    Eigen::VectorXd harmonic, geodesic;   ///< Harmonic and geodesic parts h and g (nv) [rad/s²].
+    Eigen::VectorXd attraction;           ///< −G⁻¹ ∂U (nv) [rad/s²]: the desired acceleration that the metric lets through.
+    Eigen::VectorXd recovery;             ///< Acceleration out of barriers (nv) [rad/s²]; zero outside.
+    int inside = -1;                      ///< Coordinate deepest below its floor; -1: none.
+    Eigen::VectorXd switch_weights;       ///< Weights s (nv): 1 is harmonic.
+    Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m).
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
-    Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
-    Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
-    /// Input: τ [s] at least by which obstacles that approach are looked for, see Horizon.
+    Clearances clearances;                ///< Clearances of the coordinates that are barriers of clearances (m).
+    Eigen::VectorXd activations;          ///< Input: activation distances (m) of these, at first the system's.
+    /// Input: least time τ [s] within which approaching obstacles count, see Horizon.
     double horizon = Horizon::of_obstacles;
     GraphMetric metric;
-    GoalPotential goal;  ///< U, ∂U, v* and the distance to the goal
+    GoalPotential goal;  ///< U, ∂U, v* and the distance to the goal.
 
     /// Positions and velocities of the links at the last step.
     const KinematicState& state() const noexcept { return state_; }

@@ -28,17 +28,17 @@ struct JointGoal {
   /// Throws std::invalid_argument on different sizes.
   JointGoal(Eigen::VectorXd position, Eigen::VectorXd velocity, Eigen::VectorXd acceleration);
 
-  Eigen::VectorXd position;      ///< q* (nv) [rad | m]
-  Eigen::VectorXd velocity;      ///< dq*/dt (nv) [rad/s | m/s]
-  Eigen::VectorXd acceleration;  ///< d²q*/dt² (nv) [rad/s² | m/s²]
+  Eigen::VectorXd position;      ///< Position q* (nv) [rad | m].
+  Eigen::VectorXd velocity;      ///< Velocity dq*/dt (nv) [rad/s | m/s].
+  Eigen::VectorXd acceleration;  ///< Acceleration d²q*/dt² (nv) [rad/s² | m/s²].
 };
 
 struct PoseGoalSettings {
-  bool position_only = false;          ///< leave the orientation free
-  double position_stiffness = 4.0;     ///< k_p [1/(m s)²], so that J'J k_p is a stiffness of the joints [1/s²]
-  double orientation_stiffness = 0.5;  ///< k_R [1/s²]
-  Eigen::VectorXd rest;                ///< q_rest (nv) that the free joints are drawn to; empty: none
-  double posture_stiffness = 0.0;      ///< k_0 [1/s²] of that pull
+  bool position_only = false;          ///< Whether the orientation is free.
+  double position_stiffness = 4.0;     ///< Stiffness k_p [1/(m s)²], so that J'J k_p is a stiffness of the joints [1/s²].
+  double orientation_stiffness = 0.5;  ///< Stiffness k_R [1/s²].
+  Eigen::VectorXd rest;                ///< Posture q_rest (nv) that attracts the free joints; empty: none.
+  double posture_stiffness = 0.0;      ///< Stiffness k_0 of that attraction [1/s²].
 };
 
 /// A pose of a frame, in the world. With p, R the frame's and φ = log(R*ᵀ R) the rotation vector between them,
@@ -65,10 +65,10 @@ struct PoseGoal {
   /// stiffness of `other` do not count. Throws std::invalid_argument on a goal of another robot and a frame that has one.
   PoseGoal& add(PoseGoal other);
 
-  Eigen::Isometry3d pose;  ///< X_WF* in the world
-  Vector6d twist;          ///< how it moves, in the world: velocity of its origin [m/s], angular velocity [rad/s]
+  Eigen::Isometry3d pose;  ///< Pose X_WF* in the world.
+  Vector6d twist;          ///< Its motion in the world: velocity of the origin [m/s], angular velocity [rad/s].
   PoseGoalSettings settings;
-  std::vector<PoseGoal> others;  ///< see `add`; without others of their own
+  std::vector<PoseGoal> others;  ///< Further goals, see `add`; these have no others of their own.
 
   /// What a goal keeps of the robot it was made for: enough to make it again where the robot is not at hand.
   struct MadeFor {
@@ -126,13 +126,13 @@ struct GoalPotential {
   /// No goal: nothing pulls, and damping brings the arm to rest where it is. No allocation.
   void release() noexcept;
 
-  double potential = 0.0;    ///< U, without the posture pull
-  Eigen::VectorXd gradient;  ///< ∂U/∂q − a* (nv), posture pull included
-  Eigen::VectorXd velocity;  ///< v* (nv)
+  double potential = 0.0;    ///< U, without the posture.
+  Eigen::VectorXd gradient;  ///< Gradient ∂U/∂q − a* (nv), posture included.
+  Eigen::VectorXd velocity;  ///< Desired velocity v* (nv).
   // How far the goal is, the farthest of its frames; NaN where the goal has no such part.
-  double joint_error = nan;     ///< largest |q − q*| [rad | m]
-  double position_error = nan;  ///< |p − p*| [m]
-  double rotation_error = nan;  ///< |φ| [rad], at most π
+  double joint_error = nan;     ///< Largest |q − q*| [rad | m].
+  double position_error = nan;  ///< Distance |p − p*| [m].
+  double rotation_error = nan;  ///< Angle |φ| [rad], at most π.
 
   /// The coordinate that `joint_error` belongs to; -1 where the goal is no configuration.
   int farthest_coordinate() const noexcept;
@@ -150,7 +150,7 @@ struct GoalPotential {
 /// The rotation vector φ of a rotation matrix, |φ| <= π. Finite for every rotation; at a half turn one of ±φ.
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) noexcept;
 
-/// Largest entry of R^T R - 1 that a rotation R may have: of matrices that went through single precision.
+/// Largest entry of R^T R - 1 that a rotation R may have: matrices may have gone through single precision.
 inline constexpr double rotation_tolerance = 1e-6;
 /// Largest entry of R^T R - 1 that counts as rounding: a quaternion of three digits has up to 0.008.
 inline constexpr double rotation_rounding = 0.01;

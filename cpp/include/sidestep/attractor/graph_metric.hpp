@@ -43,9 +43,9 @@ class GraphMetric {
   bool is_small() const noexcept { return num_used_ <= jacobian_transposed_.rows(); }
   void solve_factored(Eigen::Ref<Eigen::VectorXd> x) const noexcept;
 
-  Eigen::Index num_used_ = 0;            // coordinates with a gradient
-  std::vector<Eigen::Index> used_;       // which ones
-  Eigen::MatrixXd jacobian_transposed_;  // their gradients, as columns, with space behind them
+  Eigen::Index num_used_ = 0;            // Number of coordinates with a gradient.
+  std::vector<Eigen::Index> used_;       // Indices of these.
+  Eigen::MatrixXd jacobian_transposed_;  // Their gradients, as columns, with padding behind them.
   Eigen::MatrixXd factor_;               // S if it is a number; else the Cholesky factor of S, or of G, top left
   Eigen::VectorXd along_;                // J x, then S⁻¹ J x
 };

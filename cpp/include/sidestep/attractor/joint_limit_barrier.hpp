@@ -26,7 +26,7 @@ class JointLimitBarrier final : public Barrier {
  private:
   struct PositionLimit {
     int joint_coordinate;
-    double sign;  // +1: lower limit, −1: upper limit
+    double sign;  // +1: lower limit, −1: upper limit.
     double position;
   };
   std::vector<PositionLimit> limits_;

@@ -13,10 +13,11 @@
 namespace sidestep {
 
 struct LocalMinimumSettings {
-  double patience = 0.6;   ///< [s] without progress after which the arm counts as stuck
-  double fraction = 0.05;  ///< progress is a goal potential (or squared distance) that falls by this fraction
-  double leg = 2.0;        ///< [s] the longest way towards the first sub-goal for a goal; n times that to the n-th
-  double spread = 1.7;     ///< [rad | m] how far each joint of the first may be from the arm; n times that of the n-th
+  double patience = 0.6;   ///< Time without progress after which the arm counts as stuck [s].
+  double fraction = 0.05;  ///< Fraction by which the goal potential (or the squared distance) falls in progress [-].
+  double leg = 2.0;        ///< Longest time spent on the first sub-goal for a goal [s]; n times that on the n-th.
+  /// Largest distance of each joint of the first sub-goal from the arm [rad | m]; n times that for the n-th.
+  double spread = 1.7;
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -57,17 +58,17 @@ class LocalMinimumRecovery {
   LocalMinimumSettings settings_;
   Eigen::VectorXd lower_, upper_;
   std::mt19937_64 random_;
-  ProgressMonitor stuck_, halted_;  // on the way to the goal, and to a sub-goal
+  ProgressMonitor stuck_, halted_;  // Monitors of progress to the goal, and to a sub-goal.
   Goal sub_goal_;
-  Eigen::VectorXd configuration_;  // of the goal in the step before, one of the two
+  Eigen::VectorXd configuration_;  // Configuration or pose of the goal in the step before.
   Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
   bool was_pose_ = false;
   double time_ = 0.0, since_ = 0.0;
-  double way_ = std::numeric_limits<double>::infinity();  // left to the goal in the step before
+  double way_ = std::numeric_limits<double>::infinity();  // Distance to the goal in the step before.
   bool escaping_ = false;
-  bool turned_ = true;  // the potential of the step before is that of another goal
+  bool turned_ = true;  // Whether the potential of the step before is that of another goal.
   int count_ = 0;
-  int tries_ = 0;  // sub-goals for this goal: each is farther off than the one before
+  int tries_ = 0;  // Sub-goals for this goal so far: each is farther off than the one before.
 };
 
 }  // namespace sidestep

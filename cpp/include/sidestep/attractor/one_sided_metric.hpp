@@ -26,7 +26,7 @@ class OneSidedMetric {
 
  private:
   GraphMetric metric_;
-  Eigen::MatrixXd columns_, resisting_;  // the gradients in use; those of S, zero elsewhere
+  Eigen::MatrixXd columns_, resisting_;  // Gradients in use; those of S, zero elsewhere.
   std::vector<char> in_set_;
   Eigen::VectorXd start_;
 };

@@ -36,10 +36,10 @@ namespace sidestep {
 //    joints. Both in the geodesic term and in what bends the push, J_k of one inside is shortened to (1 − w_k)/w_k at
 // most.
 struct PenetrationRecovery {
-  double speed = 0.1;     ///< with which an arm leaves a barrier [m/s | rad/s]
-  double rate = 20.0;     ///< with which it takes up that speed [1/s]; 0: no push
-  double margin = 0.005;  ///< depth below the floor at which the push is full [m | rad]
-  double rebound = 1.0;   ///< largest joint speed that a barrier gives back [rad/s]
+  double speed = 0.1;     ///< Speed with which an arm leaves a barrier [m/s | rad/s].
+  double rate = 20.0;     ///< Rate with which it takes up that speed [1/s]; 0: no push.
+  double margin = 0.005;  ///< Depth below the floor at which the push is full [m | rad].
+  double rebound = 1.0;   ///< Largest joint speed that a barrier gives back [rad/s].
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
@@ -64,7 +64,7 @@ class PenetrationRecoveryWorkspace {
  private:
   GraphMetric metric_;
   OneSidedMetric one_sided_;
-  Eigen::MatrixXd jacobian_transposed_;  // scaled
+  Eigen::MatrixXd jacobian_transposed_;  // Scaled gradients, as columns.
   Eigen::VectorXd fades_;                // to what J_k is shortened inside, else 1 (m)
   Eigen::VectorXd curvatures_;           // scaled (m)
 };

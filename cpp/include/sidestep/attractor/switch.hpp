@@ -30,8 +30,8 @@ struct SigmoidSwitch {
 /// The same for each joint i, with s_i = 1 / (1 + exp(−slope (d_i − threshold_i))) (T6.1, T6.2), where d_i [m] is the
 /// smallest distance between the obstacles and the Gaussian means on the link that joint i carries.
 struct DistanceSwitch {
-  Eigen::VectorXd thresholds;  ///< [m]
-  double slope;                ///< [1/m]
+  Eigen::VectorXd thresholds;  ///< Distances where the switch is half [m].
+  double slope;                ///< Steepness of the switch [1/m].
 };
 
 using Switch = std::variant<Unswitched, HarmonicOnly, GeodesicOnly, BinarySwitch, SigmoidSwitch, DistanceSwitch>;

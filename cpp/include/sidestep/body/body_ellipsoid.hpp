@@ -12,10 +12,10 @@ namespace sidestep {
 /// the world where `joint` is −1. With support s(n) = √(nᵀ shape n): its half-width along a unit vector n.
 struct BodyEllipsoid {
   int joint;
-  int component;  ///< of the body it came from
+  int component;  ///< Index of the component of the body.
   Eigen::Vector3d mean;
-  Eigen::Matrix3d shape;  ///< level · covariance [m²]
-  double extent;          ///< longest semi-axis [m]: the radius of a ball around it
+  Eigen::Matrix3d shape;  ///< level · covariance [m²].
+  double extent;          ///< Longest semi-axis [m]: radius of a ball around it.
 };
 
 /// The ellipsoids of a calibrated body, those of one joint together in the order of the joints.

@@ -10,10 +10,10 @@ namespace sidestep {
 
 /// Signed distances to a surface at the nodes of a grid [m], positive outside; trilinear in between.
 struct DistanceGrid {
-  Eigen::Vector3d origin;      ///< position of node (0, 0, 0) [m]
-  double spacing;              ///< between nodes [m]
-  std::array<int, 3> shape;    ///< numbers of nodes, each >= 2
-  std::vector<double> values;  ///< node (i, j, k) at (i shape[1] + j) shape[2] + k
+  Eigen::Vector3d origin;      ///< Position of node (0, 0, 0) [m].
+  double spacing;              ///< Distance between neighbouring nodes [m].
+  std::array<int, 3> shape;    ///< Numbers of nodes, each >= 2.
+  std::vector<double> values;  ///< Distances; node (i, j, k) is at (i shape[1] + j) shape[2] + k.
 
   /// The distance at a point and its gradient; a point off the grid sees the grid's border.
   double operator()(const Eigen::Vector3d& point, Eigen::Vector3d& gradient) const noexcept;
@@ -29,15 +29,15 @@ struct SolidEllipsoids {
 
 /// How `refine_cover` descends.
 struct CoverRefinement {
-  int steps;             ///< of the descent (Adam)
-  double first_rate;     ///< length of the first steps [m]
-  double last_rate;      ///< of the last; geometric in between [m]
-  double stiffness;      ///< of the augmented Lagrangian, per squared depth in `unit`
-  int multiplier_steps;  ///< steps between two updates of the multipliers
-  double margin;         ///< by which points should lie inside [m]
-  double unit;           ///< overshoot at which its mean and its peaks count alike [m]
-  double area;           ///< of the surface [m^2]: overshoot is counted per area
-  double slimness;       ///< least shortest over longest semi-axis
+  int steps;             ///< Steps of the descent (Adam).
+  double first_rate;     ///< Length of the first steps [m].
+  double last_rate;      ///< Length of the last steps [m]; geometric in between.
+  double stiffness;      ///< Stiffness of the augmented Lagrangian, per squared depth in `unit`.
+  int multiplier_steps;  ///< Steps between two updates of the multipliers.
+  double margin;         ///< Depth by which points should lie inside [m].
+  double unit;           ///< Overshoot at which its mean and its peaks count alike [m].
+  double area;           ///< Area of the surface [m^2]: overshoot is counted per area.
+  double slimness;       ///< Least ratio of shortest to longest semi-axis [-].
 };
 
 /// Moves and bends ellipsoids so that their union holds points of a surface and overshoots the surface little.

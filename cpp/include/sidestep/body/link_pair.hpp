@@ -10,7 +10,7 @@ namespace sidestep {
 /// links do. The clearance of the pair is the gap between their ellipsoids less `contact`.
 struct LinkPair {
   std::string first, second;
-  double contact = 0.0;  ///< largest gap between the ellipsoids at which the links may touch [m]
+  double contact = 0.0;  ///< Largest gap between the ellipsoids at which the links may touch [m].
 };
 
 }  // namespace sidestep

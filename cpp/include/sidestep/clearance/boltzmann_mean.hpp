@@ -29,7 +29,8 @@ class BoltzmannMean {
 
   explicit BoltzmannMean(double temperature) noexcept : inverse_T_(1.0 / temperature) {}
 
-  /// Samples this far beyond the smallest weigh less than exp(−30) = 1e-13: rounding.
+  /// Height above the smallest sample, in temperatures, from which samples are dropped: their weight is below
+  /// exp(−30) = 1e-13, which is rounding.
   static constexpr double window = 30.0;
   /// Whether a sample of this value changes the mean.
   bool matters(double value) const noexcept { return value < reference_ + window / inverse_T_; }
@@ -47,7 +48,7 @@ class BoltzmannMean {
   double inverse_T_;
   double reference_ = std::numeric_limits<double>::infinity();
   Sums sums_;
-  WrenchPair g0_, g1_;  // gradients of s0 and s1
+  WrenchPair g0_, g1_;  // Gradients of s0 and s1.
 };
 
 /// The temperature [m] itself. Throws std::invalid_argument, which `owner` begins, unless it is positive and finite.

@@ -37,7 +37,8 @@ class ClearanceField final : public ClearanceGroup {
   /// Derivatives do not know of points that come into the window; second differences see them up to about 24, where the
   /// change is 2e-12 m.
   static constexpr double default_window = 12.0;
-  /// Of what approaches, whose weights are not differentiated, points count up to e⁻⁸ = 3e-4.
+  /// Window of the mean of what approaches, in temperatures. Its weights are not differentiated, so that points down to
+  /// e⁻⁸ = 3e-4 suffice.
   static constexpr double window_ahead = 8.0;
 
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, the
@@ -64,8 +65,8 @@ class ClearanceField final : public ClearanceGroup {
   class Search;
   struct Ellipsoid {
     BodyEllipsoid body;
-    Eigen::Matrix3d axes_T;     // rotates into the principal axes
-    Eigen::Vector3d semi_axes;  // along them [m]
+    Eigen::Matrix3d axes_T;     // Rotation into the principal axes.
+    Eigen::Vector3d semi_axes;  // Semi-axes along them [m].
   };
   /// Consecutive ellipsoids of one link, with a ball around them in the frame of its child.
   struct Cluster {
@@ -74,13 +75,13 @@ class ClearanceField final : public ClearanceGroup {
     int first, size;
     Eigen::Vector3d centre;
     double radius;
-    double inner_radius;                       // of one around the balls inside them
-    Eigen::Matrix<float, most, 16> principal;  // of every ellipsoid, as inner loops read it
+    double inner_radius;                       // Radius of a ball around the balls inside them [m].
+    Eigen::Matrix<float, most, 16> principal;  // Numbers of every ellipsoid, as inner loops read them.
   };
 
   double temperature_, window_;
-  std::vector<std::string> links_;     // of the body's components
-  std::vector<Ellipsoid> ellipsoids_;  // those of one joint stand together
+  std::vector<std::string> links_;     // Link of each component of the body.
+  std::vector<Ellipsoid> ellipsoids_;  // Ellipsoids; those of one joint stand together.
   std::vector<Cluster> clusters_;
 };
 

@@ -14,7 +14,7 @@ namespace sidestep {
 /// Clearances of one kind with their derivatives: of ellipsoids to obstacles, of pairs of links, and so on.
 class ClearanceGroup {
  public:
-  /// Largest share of an activation distance that is kept as a margin by what no sensor sees.
+  /// Largest share of an activation distance that two links or a plane, which no sensor sees, keep as a margin [-].
   static constexpr double margin_share = 0.5;
 
   virtual ~ClearanceGroup() = default;
@@ -51,8 +51,8 @@ class ClearanceGroup {
   static constexpr double usually_near = 0.011;
   /// The longest activation distance [m] of two links, from the median of their clearances [m] over the whole range.
   static double activation_for_usual(double median) noexcept {
-    constexpr double share = 0.9;    // of what is usual
-    constexpr double least = 0.001;  // [m]
+    constexpr double share = 0.9;    // Activation distance as a share of the usual clearance [-].
+    constexpr double least = 0.001;  // Shortest activation distance [m].
     return median > 0.0 && median < usually_near ? std::max(share * median, least) : std::numeric_limits<double>::infinity();
   }
 };

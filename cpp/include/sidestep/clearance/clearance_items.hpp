@@ -26,11 +26,11 @@ struct ClearanceItem {
   ClearanceItem(Source from, int number, CoordinateLabel what, Eigen::Index nv);
 
   Source source;
-  int index;  ///< of the pair, plane, table or load; of an obstacles' item, the link
+  int index;  ///< Index of the pair, plane, table or load; for an item of obstacles, of the link.
   CoordinateLabel label;
-  int link = -1, other = -1;  ///< of BodyLinks; other: of a pair; both -1 for a table and a load
-  int base = -1;              ///< joint that moves both of a pair alike
-  double contact = 0.0;       ///< of a pair [m]
+  int link = -1, other = -1;  ///< Index in BodyLinks; `other`: second link of a pair; both -1 for a table and a load.
+  int base = -1;              ///< Joint that moves both links of a pair alike; -1: none.
+  double contact = 0.0;       ///< Contact gap of a pair [m].
 
   /// R of every coordinate: the farthest that a point of the item moves, relative to what it keeps off, for a unit of it
   /// (nv) [m/rad | 1]; of a table and a load the steepest slopes.

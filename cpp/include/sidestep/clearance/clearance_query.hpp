@@ -69,34 +69,34 @@ class ClearanceQuery {
     struct Pose {
       Eigen::Matrix3d R;
       Eigen::Vector3d p;
-      Eigen::Vector3d angular, linear;  // velocities along an edge, of p
+      Eigen::Vector3d angular, linear;  // Velocities along an edge, angular and of p.
     };
     struct Interval {
       double middle, half;
     };
-    static constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
+    static constexpr std::size_t most_intervals = 4096;  // Most intervals of an edge: 2 m of motion divided down to 1 mm.
     std::vector<Pose> poses_;
-    std::vector<Eigen::Vector3d> centres_;  // of the balls around the links
+    std::vector<Eigen::Vector3d> centres_;  // Centres of the balls around the links.
     std::vector<Interval> intervals_;
-    std::vector<std::uint64_t> open_;       // items that are not decided on an interval, a bit each: `words()` of each interval
-    Eigen::VectorXd motions_, curvatures_;  // of the items along an edge
+    std::vector<std::uint64_t> open_;       // Items still undecided on an interval, one bit each: `words()` of each interval.
+    Eigen::VectorXd motions_, curvatures_;  // Motions and curvatures of the items along an edge.
     Eigen::VectorXd lengths_, products_;    // |Δq_i|, |Δq_i| |Δq_j|
     DistanceField field_;
-    std::vector<double> bounds_;  // of the ellipsoids of a link
+    std::vector<double> bounds_;  // Bounds of the ellipsoids of a link.
     Eigen::VectorXd q_, difference_;
-    Eigen::VectorXd placed_;  // where the body is
+    Eigen::VectorXd placed_;  // Configuration of the placed body.
     KinematicState state_;    // there, once it is asked for
     Eigen::VectorXd rest_, gradient_;
     bool state_is_old_ = true;
     std::int64_t checks_ = 0;
-    int last_ = 0;  // the item that was in the way last: it is looked at first
+    int last_ = 0;  // Item that was in the way last: it is checked first.
   };
 
   /// The smallest clearance of all items, not above `cap` [m].
   struct Nearest {
     double clearance;
-    int item = -1;   ///< -1: all are as far as `cap`
-    int point = -1;  ///< which obstacle point, for an item of obstacles
+    int item = -1;   ///< Index of the item; -1: all are as far as `cap`.
+    int point = -1;  ///< Index of the obstacle point, for an item of obstacles.
   };
   Nearest nearest(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
 

@@ -7,18 +7,18 @@ namespace sidestep {
 
 /// Where a clearance is and goes, one entry per coordinate.
 struct ClearanceStateView {
-  Eigen::Map<Eigen::VectorXd> values;      ///< h (m) [m], signed
-  Eigen::Map<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included
-  Eigen::Map<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²]
-  Eigen::Map<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad]
+  Eigen::Map<Eigen::VectorXd> values;      ///< Clearances h (m) [m], signed.
+  Eigen::Map<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included.
+  Eigen::Map<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²].
+  Eigen::Map<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad].
 };
 
 /// Where an embedding that is a barrier of clearances writes them.
 struct ClearanceView : ClearanceStateView {
-  Eigen::Map<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
-  Eigen::Map<Eigen::VectorXd> margins;  ///< (m) ClearanceConstraints keep no larger margins than these [m]
-  ClearanceStateView approach;          ///< of the critical sample, see stopping_clearance.hpp
-  Eigen::Map<Eigen::VectorXd> least;    ///< (m) the smallest of those that h is the mean of [m]; +inf: beyond the reach
+  Eigen::Map<Eigen::VectorXi> nearest;  ///< Nearest point (m); beyond the reach the one that approaches; -1: neither.
+  Eigen::Map<Eigen::VectorXd> margins;  ///< Largest margin (m) that ClearanceConstraints keep [m].
+  ClearanceStateView approach;          ///< State of the critical sample, see stopping_clearance.hpp.
+  Eigen::Map<Eigen::VectorXd> least;    ///< Smallest clearance (m) of those that h is the mean of [m]; +inf: beyond the reach.
 };
 
 /// The memory that such views show.

@@ -16,10 +16,10 @@ struct CoordinateLabel {
     effort,       ///< what a joint holds of the arm against its effort limit, see GravityTorqueLimit
   };
   Kind kind = Kind::potential;
-  std::string name = {};                                    ///< of the link, or of the coordinate for limits
-  std::string other = {};                                   ///< the second link of a pair; "lower" or "upper" for a joint limit
-  double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
-  bool prismatic = false;                                   ///< a limit of a prismatic joint: the clearance is in m, not in rad
+  std::string name = {};                                    ///< Name of the link, or of the coordinate for limits.
+  std::string other = {};                                   ///< Second link of a pair; "lower" or "upper" for a joint limit.
+  double floor = -std::numeric_limits<double>::infinity();  ///< Clearance below which the arm counts as inside.
+  bool prismatic = false;  ///< Whether it is a limit of a prismatic joint: the clearance is in m, not in rad.
 };
 
 }  // namespace sidestep

@@ -30,21 +30,22 @@ class DistanceField {
   double bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept;
 
  private:
-  static constexpr double block_edge = 0.16;  // [m]
-  static constexpr int divisions = 4;         // of it into fine cells
-  static constexpr int most_blocks = 4096;    // what lies outside them is measured each time
-  static constexpr std::uint32_t slots = 2 * most_blocks;
-  using Block = std::array<float, 1 + divisions * divisions * divisions>;  // the coarse cell is the block
+  static constexpr double block_edge = 0.16;               // Edge of a block [m].
+  static constexpr int divisions = 4;                      // Fine cells along the edge of a block.
+  static constexpr int most_blocks = 4096;                 // Most blocks; places outside them are measured each time.
+  static constexpr std::uint32_t slots = 2 * most_blocks;  // Slots of the hash table.
+  // Distance at the coarse cell, which is the block, and at the fine ones.
+  using Block = std::array<float, 1 + divisions * divisions * divisions>;
   struct Slot {
     std::uint64_t key = 0;
-    std::uint64_t generation = 0;  // of the obstacles; others are empty slots
+    std::uint64_t generation = 0;  // Generation of the obstacles; slots of another one are empty.
     int block = 0;
   };
 
   float* block_of(std::uint64_t key) noexcept;
 
   std::vector<Slot> slots_;
-  Slot last_;  // that was asked for last: places asked for one after another are often near each other
+  Slot last_;  // Slot of the last query: successive places are often near each other.
   std::vector<Block> blocks_;
   int used_ = 0;
   std::uint64_t generation_ = 1;

@@ -17,11 +17,11 @@ struct EllipsoidPairs {
 
   RelativeMotion motion;
   int size = 0;
-  alignas(64) double centre_a[3][capacity], centre_b[3][capacity];  // each in its frame [m]
+  alignas(64) double centre_a[3][capacity], centre_b[3][capacity];  // Centres, each in its frame [m].
   alignas(64) double shape_a[6][capacity], shape_b[6][capacity];    // S, each in its frame [m²]
 
   // In a.
-  alignas(64) double value[capacity], rate[capacity], curvature[capacity];  // h, h', h'' at q̈ = 0
+  alignas(64) double value[capacity], rate[capacity], curvature[capacity];  // h, h', h'' at q̈ = 0.
   alignas(64) double normal[3][capacity];                                   // n
   alignas(64) double contact[3][capacity];                                  // the point of b nearest to a [m]
 };

@@ -24,14 +24,14 @@ class GravityTorqueLimit final : public ClearanceGroup {
   struct Load {
     struct Carrier {
       int joint;
-      std::vector<int> carried;  // joints, the carrier first
+      std::vector<int> carried;  // Joints that it carries, itself first.
     };
     int coordinate;
-    double effort;             ///< [Nm | N]
-    double weight;             ///< [N]
-    double activation;         ///< [m], no longer than a tenth of effort / weight
-    Eigen::VectorXd steepest;  ///< bounds |∂h/∂q| (nv) [m/rad]; infinite below a prismatic joint without limits
-    Eigen::MatrixXd bend;      ///< bounds |∂²h/∂q²| (nv × nv) [m/rad²]
+    double effort;             ///< Effort limit [Nm | N].
+    double weight;             ///< Weight by which torque becomes a clearance [N].
+    double activation;         ///< Activation distance [m], no longer than a tenth of effort / weight.
+    Eigen::VectorXd steepest;  ///< Bounds of |∂h/∂q| (nv) [m/rad]; infinite below a prismatic joint without limits.
+    Eigen::MatrixXd bend;      ///< Bounds of |∂²h/∂q²| (nv × nv) [m/rad²].
     std::vector<Carrier> carriers;
   };
   const std::vector<Load>& loads() const noexcept { return loads_; }

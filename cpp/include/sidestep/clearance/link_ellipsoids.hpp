@@ -15,19 +15,19 @@ namespace sidestep {
 
 /// A covering ellipsoid in its principal axes, and balls that cover it.
 struct LinkEllipsoid : BodyEllipsoid {
-  Eigen::Matrix3d axes_T;   ///< rotates into the principal axes, of the joint's child
-  Eigen::Vector3d squares;  ///< of the semi-axes, ascending [m²]
+  Eigen::Matrix3d axes_T;   ///< Rotation into the principal axes, from the joint's child.
+  Eigen::Vector3d squares;  ///< Squared semi-axes, ascending [m²].
   std::vector<CoverBall> cover;
 };
 
 /// The ellipsoids of one link, in the frame of its joint's child.
 struct LinkEllipsoids {
   std::string name;
-  int joint;  ///< that moves it; -1: none
+  int joint;  ///< Joint that moves it; -1: none.
   std::vector<LinkEllipsoid> ellipsoids;
-  std::vector<EllipsoidRow> rows;  ///< the same, side by side
-  Eigen::Vector3d centre;          ///< of a ball around them
-  double radius;                   ///< of that ball [m]
+  std::vector<EllipsoidRow> rows;  ///< The same ellipsoids, side by side.
+  Eigen::Vector3d centre;          ///< Centre of a ball around them [m].
+  double radius;                   ///< Radius of that ball [m].
 };
 
 /// All links of a body that have ellipsoids, those far from the base first: they are the likeliest in the way.

@@ -15,15 +15,15 @@ namespace sidestep {
 /// with motion() the bound of how far the item moves, see ClearanceQuery::motions().
 struct Margins {
   struct End {
-    Eigen::VectorXd q;         ///< (nv)
-    Eigen::VectorXd deficits;  ///< δ of every item [m], zero where the margin holds
+    Eigen::VectorXd q;         ///< Configuration (nv).
+    Eigen::VectorXd deficits;  ///< Deficit δ of every item [m], zero where the margin holds.
   };
 
-  double margin = 0.02;       ///< [m]
-  double slack = 0.002;       ///< [m], positive: smaller costs more
-  double fade = 0.3;          ///< [m], positive
-  std::vector<End> ends;      ///< those with a deficit
-  double pair_margin = 0.02;  ///< of two links at most [m]: neighbours are never far apart
+  double margin = 0.02;       ///< Clearance kept [m].
+  double slack = 0.002;       ///< Part of the margin that may be missing between checks [m], positive: smaller costs more.
+  double fade = 0.3;          ///< Distance from an end over which its deficit fades [m], positive.
+  std::vector<End> ends;      ///< Ends with a deficit.
+  double pair_margin = 0.02;  ///< Largest margin of two links [m]: neighbours are never far apart.
 };
 
 }  // namespace sidestep

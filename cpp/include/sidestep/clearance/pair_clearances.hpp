@@ -16,11 +16,11 @@ namespace sidestep {
 /// Boltzmann mean (see boltzmann_mean.hpp).
 class PairClearances final : public ClearanceGroup {
  public:
-  static constexpr double default_temperature = 0.002;  // [m] of the mean
+  static constexpr double default_temperature = 0.002;  // Temperature of the mean [m].
 
   struct Pair {
-    int first, second;  ///< of the links
-    double contact;     ///< gap at which the links touch [m]
+    int first, second;  ///< Indices of the links.
+    double contact;     ///< Gap at which the links touch [m].
   };
 
   /// Throws std::invalid_argument, which `owner` begins, if there is no pair, a link is unknown or has no ellipsoid, the two

@@ -13,10 +13,10 @@ namespace sidestep {
 struct PairDistanceTable {
   /// Where the control points are: the one of number i at begin + i·spacing.
   struct Axis {
-    int coordinate = 0;     ///< of the robot
-    double begin = 0.0;     ///< [rad | m]
-    double spacing = 1.0;   ///< [rad | m]
-    bool periodic = false;  ///< the last is followed by the first: they span one turn
+    int coordinate = 0;     ///< Coordinate of the robot.
+    double begin = 0.0;     ///< Control point number 0 [rad | m].
+    double spacing = 1.0;   ///< Distance of neighbouring control points [rad | m].
+    bool periodic = false;  ///< Whether the first follows the last: they span one turn.
   };
   /// h [m] with its first and second derivatives by the two coordinates.
   struct Sample {
@@ -25,9 +25,9 @@ struct PairDistanceTable {
     Eigen::Matrix2d hessian;
   };
 
-  std::string first, second;  ///< links
+  std::string first, second;  ///< Names of the links.
   std::array<Axis, 2> axes;
-  Eigen::MatrixXd control;  ///< c, at least 4 × 4 [m]
+  Eigen::MatrixXd control;  ///< Control values c, at least 4 × 4 [m].
 
   Sample at(double x, double y) const noexcept;
 

@@ -31,8 +31,8 @@ class PlaneClearances final : public ClearanceGroup {
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                 ClearanceView out) const noexcept override;
 
-  const Eigen::Vector3d& normal() const noexcept { return normal_; }  ///< of unit length
-  double offset() const noexcept { return offset_; }                  ///< normal · point [m]
+  const Eigen::Vector3d& normal() const noexcept { return normal_; }  ///< Unit normal.
+  double offset() const noexcept { return offset_; }                  ///< Offset normal · point [m].
   int link(int k) const noexcept { return kept_[static_cast<std::size_t>(k)]; }
 
  private:
@@ -40,7 +40,7 @@ class PlaneClearances final : public ClearanceGroup {
   std::shared_ptr<const BodyLinks> links_;
   Eigen::Vector3d normal_;
   double offset_;
-  std::vector<int> kept_;  // links
+  std::vector<int> kept_;  // Links that are kept off the plane.
 };
 
 }  // namespace sidestep

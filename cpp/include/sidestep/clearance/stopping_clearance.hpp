@@ -15,12 +15,12 @@ namespace sidestep {
 /// clearance of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is
 /// smallest is the critical sample: not always the nearest, past which the arm may move.
 struct Horizon {
-  double time = 0.0;                                           ///< τ [s]
-  double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
+  double time = 0.0;                                           ///< Time τ of the stop [s].
+  double distance = -std::numeric_limits<double>::infinity();  ///< Largest h + τ h' at which a sample counts [m].
 
-  static constexpr double longest = 0.5;  ///< τ [s] at most, whatever the limits
-  /// τ [s] at least for obstacles, unless an avoidance trajectory leads the arm past them: they may come at an arm at rest, and motors
-  /// may brake less hard than the limits say.
+  static constexpr double longest = 0.5;  ///< Longest τ [s], whatever the limits.
+  /// Least τ for obstacles [s], unless an avoidance trajectory leads the arm past them: they may come at an arm at rest, and
+  /// motors may brake less hard than the limits say.
   static constexpr double of_obstacles = 0.3;
 
   /// τ = max_j |v_j| / (acceleration limit)_j / 2.

@@ -32,7 +32,7 @@ class TableClearances final : public ClearanceGroup {
 
  private:
   std::vector<PairDistanceTable> tables_;
-  std::vector<Eigen::Vector2d> steepest_;  // of each
+  std::vector<Eigen::Vector2d> steepest_;  // Steepest slopes of each table.
   std::vector<double> activations_;
 };
 

@@ -32,20 +32,20 @@ constexpr bool contains(Limit set, Limit limit) noexcept {
   return (static_cast<std::uint16_t>(set) & static_cast<std::uint16_t>(limit)) != 0;
 }
 
-/// The interval of accelerations that keeps one joint inside its limits, and which limit gives either end.
+/// Interval of accelerations that keeps one joint inside its limits, and the limit that sets each end.
 struct AccelerationInterval {
   double lower, upper;
   Limit lower_limit, upper_limit;
-  double position_lower, position_upper;  ///< the same without velocity and acceleration limits: wider, or equal
+  double position_lower, position_upper;  ///< Interval without velocity and acceleration limits: wider, or equal.
 };
 
-/// The part of an AccelerationInterval that the jerk limit leaves.
+/// Part of an AccelerationInterval within the jerk limit.
 struct SmoothInterval {
   double lower, upper;
   Limit lower_limit, upper_limit;
 };
 
-/// The limits of one joint: lower <= q <= upper, |v| <= velocity, |a| <= acceleration.
+/// Limits of one joint: lower <= q <= upper, |v| <= velocity, |a| <= acceleration.
 struct ScalarLimits {
   double lower, upper, velocity, acceleration;
 };
@@ -103,27 +103,28 @@ bool is_viable(double q, double v, const ScalarLimits& limits, double period, do
 /// both within the acceleration limit. q and v finite, period > 0.
 AccelerationInterval acceleration_interval(double q, double v, const ScalarLimits& limits, double period) noexcept;
 
-/// An acceleration, and which limit it is the largest for; both false: none.
+/// Largest acceleration, and the limit that sets it; both false: none.
 struct ReturnableAcceleration {
   double value;
   bool by_velocity = false, by_position = false;
 };
 
 /// The largest acceleration from `least` to `largest` that can be taken back by `jerk` [/s^3] in time for the upper velocity limit and
-/// an upper position limit that is `distance_left` away, at the velocity `speed`; see the derivation above. `least` where none leaves the room,
-/// less than it where the velocity limit asks for more.
+/// an upper position limit that is `distance_left` away, at the velocity `speed`; see the derivation above. `least` where none fits,
+/// less than that where the velocity limit requires it.
 ReturnableAcceleration largest_returnable(double distance_left, double speed, double least, double largest,
                                           const ScalarLimits& limits, double jerk, double period) noexcept;
 
-/// Its part within `jerk` [/s^3] of the acceleration `before` of the last period; never empty.
+/// Part of `interval` within `jerk` [/s^3] of the acceleration `before` of the last period; never empty.
 SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,
                                const ScalarLimits& limits, double jerk, double period) noexcept;
 
-/// How the bounds of all joints are drawn in.
+/// How much the bounds of all joints are narrowed.
 struct LimitMargins {
-  double position = 0.0;             ///< position limits are moved inwards by this much [rad | m]
-  double jerk_share = 1.0;           ///< of the jerk limits
-  double acceleration_factor = 1.0;  ///< acceleration limits are exceeded up to this, but not counted on for braking
+  double position = 0.0;    ///< Distance by which position limits are moved inwards [rad | m].
+  double jerk_share = 1.0;  ///< Share of the jerk limits that may be used [-].
+  /// Factor up to which acceleration limits may be exceeded [-]; braking does not count on it.
+  double acceleration_factor = 1.0;
 };
 
 /// The intervals of all joints.
@@ -135,14 +136,15 @@ struct AccelerationBounds {
   void update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period, const LimitMargins& margins = {},
               const Eigen::VectorXd* before = nullptr) noexcept;
 
-  /// Takes back what exceeds the acceleration limits (nv) and nobody asked for: from the limit to the wanted one (nv).
+  /// Narrows bounds that exceed the acceleration limit (nv) to the limit or, where that is more, to the wanted acceleration (nv).
   void draw_in(const Eigen::VectorXd& limit, ConstVectorRef wanted) noexcept;
 
-  Eigen::VectorXd lower, upper;  ///< (nv) [rad/s^2 | m/s^2]
+  Eigen::VectorXd lower, upper;  ///< Bounds (nv) [rad/s^2 | m/s^2].
   std::vector<Limit> lower_limit, upper_limit;
-  Eigen::VectorXd smooth_lower, smooth_upper;  ///< (nv) with the jerk limit; the same without a last acceleration
+  /// Bounds with the jerk limit (nv) [rad/s^2 | m/s^2]; without a last acceleration those above.
+  Eigen::VectorXd smooth_lower, smooth_upper;
   std::vector<Limit> smooth_lower_limit, smooth_upper_limit;
-  Eigen::VectorXd position_lower, position_upper;  ///< (nv), what the position limits alone ask for
+  Eigen::VectorXd position_lower, position_upper;  ///< Bounds of the position limits alone (nv) [rad/s^2 | m/s^2].
 };
 
 }  // namespace sidestep

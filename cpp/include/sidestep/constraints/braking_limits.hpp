@@ -33,11 +33,11 @@ class BrakingLimits {
   void find_responses(int first, int size, const std::vector<int>& of, const Eigen::MatrixXd& gradients,
                       const Eigen::MatrixXd& mass_cholesky) noexcept;
 
-  Eigen::VectorXd momentum_;                     // (nv) M v
-  RowBlock::Matrix responses_;                   // (nv, max) M⁻¹ ∇h of the rows chosen
-  Eigen::VectorXd effort_lower_, effort_upper_;  // (nv) of M q̈
+  Eigen::VectorXd momentum_;                     // M v (nv).
+  RowBlock::Matrix responses_;                   // M⁻¹ ∇h of the chosen rows (nv, max).
+  Eigen::VectorXd effort_lower_, effort_upper_;  // Bounds of M q̈ by effort (nv).
   QuadraticProgramData reach_data_;
-  QuadraticProgram reach_;  // what a direction can have within accelerations and torques
+  QuadraticProgram reach_;  // Program of the largest acceleration along a direction, within acceleration and torque limits.
 };
 
 }  // namespace sidestep

@@ -12,33 +12,33 @@ namespace sidestep {
 
 /// What the last period's command was, where jerk and torque rate are to keep their limits; null leaves a limit out.
 struct LastCommand {
-  const Eigen::VectorXd* acceleration = nullptr;  ///< (nv) [/s^2]
-  const Eigen::VectorXd* torque = nullptr;        ///< (nv) [Nm | N]
-  /// (nv) The bias's gravity now, and its change since then [Nm | N]: effort and its rate keep their limits with and without
-  /// it, as drives that hold the arm themselves are told less.
+  const Eigen::VectorXd* acceleration = nullptr;  ///< Acceleration (nv) [/s^2].
+  const Eigen::VectorXd* torque = nullptr;        ///< Torque (nv) [Nm | N].
+  /// Gravity part of the bias now (nv), and below its change since then [Nm | N]. Effort and its rate keep their limits with
+  /// and without it, since drives that hold the arm themselves are told less.
   const Eigen::VectorXd* gravity = nullptr;
   const Eigen::VectorXd* gravity_change = nullptr;
-  /// Factor up to which the acceleration may exceed its limits, of feedback against what the model lacks, in [1, inf) [-].
+  /// Factor up to which feedback may exceed the acceleration limits, in [1, inf) [-].
   double acceleration_factor = 1.0;
-  bool binds = true;  ///< the jerk limit; else clearances alone rise no faster than it allows
-  /// Where torques have a rate, clearances brake early enough to do it smoothly. Not while a trajectory leads past what is near: it
-  /// would be held back.
+  bool binds = true;  ///< Whether the jerk limit binds; otherwise clearances alone rise no faster than it allows.
+  /// Whether clearances brake early enough that torque keeps its rate. Not while a trajectory leads past what is near, since
+  /// that would hold it back.
   bool early = false;
-  /// (nv) What was decided of the clearances before [/s^2]: they ask for no more.
+  /// Decision about the clearances before (nv) [/s^2]: they ask for no more; null: none.
   const Eigen::VectorXd* decided = nullptr;
 };
 
 /// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
 /// solved for.
 struct SecondState {
-  const Clearances* clearances = nullptr;  ///< null: none
+  const Clearances* clearances = nullptr;  ///< Clearances there; null: none.
   const Eigen::VectorXd* velocity = nullptr;
 };
 
 /// Limit of Cartesian speed [m/s] now and after the period, at a state of the arm; null: none.
 struct SpeedLimitNow {
   const KinematicState* state = nullptr;
-  const Eigen::VectorXd* acceleration_limits = nullptr;  ///< (nv) [/s²] of the stop along the path
+  const Eigen::VectorXd* acceleration_limits = nullptr;  ///< Limits (nv) [/s²] of the stop along the path.
   double limit = std::numeric_limits<double>::infinity(), next_limit = limit;
 };
 
@@ -51,27 +51,27 @@ struct BrakingTorque {
 
 /// What is violated already, before any row is written.
 struct Survey {
-  double least_clearance = std::numeric_limits<double>::infinity();  ///< [m]
+  double least_clearance = std::numeric_limits<double>::infinity();  ///< Smallest clearance [m].
   int least_coordinate = -1, least_nearest = -1;
-  bool closes = false;  ///< what is below zero comes still nearer
+  bool closes = false;  ///< Whether a clearance below zero still decreases.
 
   bool lost() const noexcept { return least_clearance < 0.0; }
 };
 
 /// All that a constraint may read of one solve.
 struct Moment {
-  double period;  ///< [s] for which the acceleration is held
+  double period;  ///< Time for which the acceleration is held [s].
   const Eigen::VectorXd& position;
   const Eigen::VectorXd& velocity;
-  const Eigen::VectorXd* wanted;  ///< acceleration [/s²]; null: unusable
-  const BrakingTorque* dynamics;  ///< null: unusable
-  double jerk_share;              ///< share of the jerk limits with which torque keeps its rate [-]
-  bool keeps_torque_rate;         ///< some torque may change only at a limited rate from the last one
+  const Eigen::VectorXd* wanted;  ///< Wanted acceleration [/s²]; null: unusable.
+  const BrakingTorque* dynamics;  ///< Mass matrix and bias; null: unusable.
+  double jerk_share;              ///< Share of the jerk limits with which torque keeps its rate [-].
+  bool keeps_torque_rate;         ///< Whether some torque has a rate limit and a last value.
   const LastCommand& last;
-  const Clearances* clearances;  ///< at the state; null: none
+  const Clearances* clearances;  ///< Clearances at the state; null: none.
   const SecondState& second;
   const SpeedLimitNow& speed;
-  const Survey& found;  ///< complete when `append` is called
+  const Survey& found;  ///< What is violated already; complete when `append` is called.
 };
 
 /// A bound on the acceleration of the next period. One subclass, one file; see docs/how-to/add-a-constraint.md.

@@ -38,12 +38,12 @@ struct RowBlock {
 
   Priority priority;
   int size = 0;
-  bool unreachable = false;      ///< a bound cannot be met, since no joint changes what it bounds
-  Matrix normals;                ///< (capacity, nv)
-  Eigen::VectorXd lower, upper;  ///< (capacity) [/s²]
-  Eigen::VectorXd lengths;       ///< (capacity) |gradient|
-  Eigen::VectorXd depths;        ///< (capacity) how far the constraint is violated already [m], else 0
-  Eigen::VectorXd multipliers;   ///< (capacity) cost of each row to the task in the last solution, >= 0
+  bool unreachable = false;      ///< Whether a bound cannot be met, since no joint changes what it bounds.
+  Matrix normals;                ///< Unit normals (capacity, nv).
+  Eigen::VectorXd lower, upper;  ///< Bounds (capacity) [/s²].
+  Eigen::VectorXd lengths;       ///< Lengths |gradient| (capacity).
+  Eigen::VectorXd depths;        ///< Violation before this period (capacity) [m], else 0.
+  Eigen::VectorXd multipliers;   ///< Cost of each row to the task in the last solution (capacity), >= 0.
 
  private:
   bool append(ConstVectorRef gradient, double depth) noexcept;
@@ -72,9 +72,9 @@ struct Bounds {
   explicit Bounds(int num_coordinates)
       : box(num_coordinates), firm_jerk(num_coordinates), wide(num_coordinates), torque(num_coordinates) {}
 
-  AccelerationBounds box;  ///< joint limits, with jerk (smooth), without it, and of position alone
-  Box firm_jerk;           ///< what the jerk limits leave if torques keep a rate, even after jerk gave way; infinite otherwise
-  Box wide;                ///< what joints may do after a priority gave way, see Constraint::widen
+  AccelerationBounds box;  ///< Joint limits: with jerk (smooth), without it, and of position alone.
+  Box firm_jerk;  ///< Bounds that the jerk limits leave if torques keep a rate, even after jerk gave way; infinite otherwise.
+  Box wide;       ///< Bounds after a priority gave way, see Constraint::widen.
   TorqueWindow torque;
 };
 

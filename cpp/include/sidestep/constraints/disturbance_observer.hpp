@@ -39,12 +39,12 @@ class DisturbanceObserver {
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 
  private:
-  static constexpr int num_terms = 5;  // v̇, z, sign(v), v, 1
+  static constexpr int num_terms = 5;  // Number of terms: v̇, z, sign(v), v, 1.
   using Terms = Eigen::Matrix<double, num_terms, 1>;
-  using Seen = Eigen::Matrix<double, num_terms + 1, 1>;  // and what is missing
+  using Seen = Eigen::Matrix<double, num_terms + 1, 1>;  // The terms, and the missing torque.
   struct Joint {
     Seen seen = Seen::Zero();
-    Terms told = Terms::Zero();  // with the acceleration that was predicted
+    Terms told = Terms::Zero();  // Terms with the predicted acceleration.
     Eigen::Matrix<double, num_terms, num_terms + 1> instrumented = Eigen::Matrix<double, num_terms, num_terms + 1>::Zero();
     Eigen::Matrix<double, num_terms + 1, num_terms + 1> products = Eigen::Matrix<double, num_terms + 1, num_terms + 1>::Zero();
   };
@@ -55,8 +55,8 @@ class DisturbanceObserver {
   Eigen::VectorXd most_disturbance_, most_unexpected_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
   std::vector<Joint> joints_;
-  bool leaps_ = false;    // the velocity did in the last period
-  std::size_t next_ = 0;  // whose inertia is found in this period
+  bool leaps_ = false;    // Whether the velocity jumped in the last period.
+  std::size_t next_ = 0;  // Joint whose inertia is estimated in this period.
 };
 
 }  // namespace sidestep

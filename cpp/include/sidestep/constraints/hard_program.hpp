@@ -9,9 +9,9 @@ namespace sidestep {
 struct TrackingCost {
   const Eigen::MatrixXd& mass;
   const Eigen::VectorXd& bias;
-  const Eigen::VectorXd& wanted;           ///< a (nv) [/s²]
-  const Eigen::VectorXd& tracking_weight;  ///< Q (nv)
-  const Eigen::VectorXd& torque_cost;      ///< R / effort limit² (nv)
+  const Eigen::VectorXd& wanted;           ///< Wanted acceleration a (nv) [/s²].
+  const Eigen::VectorXd& tracking_weight;  ///< Tracking weight Q (nv).
+  const Eigen::VectorXd& torque_cost;      ///< Torque cost R / effort limit² (nv).
 };
 
 /// The program in which nothing gives way: over q̈, in a box, with the torques' rows and then all blocks.
@@ -29,10 +29,10 @@ class HardProgram {
  private:
   SpanCounter counter_;
   Span torque_;
-  std::vector<Span> rows_;  // of each block
+  std::vector<Span> rows_;  // Rows of each block.
   QuadraticProgramData data_;
   QuadraticProgram program_;
-  Eigen::VectorXd weighted_;  // a column of the mass matrix, by the cost of torques
+  Eigen::VectorXd weighted_;  // Column of the mass matrix, weighted by the cost of torques.
 };
 
 }  // namespace sidestep

@@ -5,10 +5,10 @@
 namespace sidestep {
 
 struct JointLimitSettings {
-  double position_margin = 0.0;   ///< position limits are moved inwards by this much [rad | m]
-  double velocity_overrun = 1.2;  ///< factor up to which velocity limits give way to clearances and torque, in [1, inf) [-]
-  double acceleration_overrun = 10.0;  ///< factor up to which acceleration limits give way, in [1, inf) [-]
-  bool hard = false;                   ///< velocity and acceleration limits do not give way
+  double position_margin = 0.0;   ///< Distance by which position limits are moved inwards [rad | m].
+  double velocity_overrun = 1.2;  ///< Factor up to which velocity limits give way to clearances and torque, in [1, inf) [-].
+  double acceleration_overrun = 10.0;  ///< Factor up to which acceleration limits give way, in [1, inf) [-].
+  bool hard = false;                   ///< Whether velocity and acceleration limits never give way.
 };
 
 /// Joint box: limits of position, velocity, acceleration and jerk (see acceleration_bounds.hpp).

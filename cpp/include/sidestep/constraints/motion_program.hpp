@@ -54,13 +54,14 @@ struct MotionProgramSettings {
 
 /// Input of one solve.
 struct MotionRequest {
-  Eigen::Ref<const Eigen::VectorXd> q;             ///< (nv) [rad | m]
-  Eigen::Ref<const Eigen::VectorXd> v;             ///< (nv) [/s]
-  Eigen::Ref<const Eigen::VectorXd> acceleration;  ///< wanted (nv) [/s²]
+  Eigen::Ref<const Eigen::VectorXd> q;             ///< Position (nv) [rad | m].
+  Eigen::Ref<const Eigen::VectorXd> v;             ///< Velocity (nv) [/s].
+  Eigen::Ref<const Eigen::VectorXd> acceleration;  ///< Wanted acceleration (nv) [/s²].
   /// M (nv, nv, symmetric) and bias h (nv) [Nm | N]; not read without torque.
   Eigen::Ref<const Eigen::MatrixXd> mass_matrix = Eigen::MatrixXd();
   Eigen::Ref<const Eigen::VectorXd> bias = Eigen::VectorXd();
-  const Clearances* clearances = nullptr;  ///< at (q, v), for example those of a GeometricSystem::Workspace; null: none
+  /// Clearances at (q, v), for example those of a GeometricSystem::Workspace; null: none.
+  const Clearances* clearances = nullptr;
   SecondState second = {};
   LastCommand last = {};
   SpeedLimitNow speed = {};
@@ -117,7 +118,7 @@ class MotionProgram {
   struct Search {
     bool solved = false;
     bool kept_jerk = true;
-    bool recovers = false;  ///< recovery was appended: it is still to be solved for
+    bool recovers = false;  ///< Whether recovery was appended, which is still to be solved for.
   };
 
   Known take(const MotionRequest& request) noexcept;
@@ -141,17 +142,17 @@ class MotionProgram {
   int nv_;
   MotionProgramSettings settings_;
   JointLimits limits_;
-  Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
+  Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2.
   bool effort_has_rate_;
   Constraints constraints_;
   Bounds bounds_;
-  std::vector<RowBlock> blocks_;  // of each constraint
+  std::vector<RowBlock> blocks_;  // Rows of each constraint.
   HardProgram hard_;
   SlackProgram slack_;
   ShortfallProgram shortfall_;
   ShortRows short_rows_;
   Eigen::MatrixXd mass_, mass_cholesky_;
-  Eigen::VectorXd position_, velocity_, wanted_, bias_;  // usable copies of the input
+  Eigen::VectorXd position_, velocity_, wanted_, bias_;  // Usable copies of the input.
   std::int64_t counts_[7] = {};
 };
 

@@ -29,12 +29,13 @@ const char* name(TorqueFault fault) noexcept;
 
 /// What one solve did about one clearance.
 struct SafetyRow {
-  int coordinate;     ///< which clearance
-  int nearest;        ///< its nearest obstacle point
-  bool along_path;    ///< asks for a stop along the path: −|∇h| v/|v| stands for ∇h below (see clearance_constraints.hpp)
-  double required;    ///< smallest ∇h·q̈ [m/s²] that was asked for
-  double slack;       ///< by how much the solution falls short of it [m/s²]; 0 unless relaxed_safety
-  double multiplier;  ///< what the row costs the task, >= 0; the largest one dominates
+  int coordinate;  ///< Coordinate of the clearance.
+  int nearest;     ///< Its nearest obstacle point.
+  /// Whether it asks for a stop along the path: −|∇h| v/|v| stands for ∇h below (see clearance_constraints.hpp).
+  bool along_path;
+  double required;    ///< Smallest ∇h·q̈ that was asked for [m/s²].
+  double slack;       ///< Shortfall of the solution [m/s²]; 0 unless relaxed_safety.
+  double multiplier;  ///< Cost of the row to the task, >= 0; the largest one dominates.
 };
 
 /// What one solve gives. Made once, written by every solve.
@@ -43,19 +44,19 @@ struct TorqueSolution {
 
   TorqueStatus status = TorqueStatus::ok;
   TorqueFault fault = TorqueFault::none;
-  Eigen::VectorXd torque;         ///< [Nm | N], within the effort limits, always finite
-  Eigen::VectorXd acceleration;   ///< M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable
-  Eigen::VectorXd slack;          ///< acceleration beyond its bounds [/s^2], signed; 0 unless relaxed
-  Eigen::VectorXd lower, upper;   ///< the acceleration bounds used [/s^2]; NaN if q or v is unusable
-  std::vector<Limit> active;      ///< the limits in the way of each joint
-  std::vector<SafetyRow> safety;  ///< the first num_safety_rows, most critical first
+  Eigen::VectorXd torque;         ///< Torque [Nm | N], within the effort limits, always finite.
+  Eigen::VectorXd acceleration;   ///< Acceleration M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable.
+  Eigen::VectorXd slack;          ///< Acceleration beyond its bounds [/s^2], signed; 0 unless relaxed.
+  Eigen::VectorXd lower, upper;   ///< Acceleration bounds used [/s^2]; NaN if q or v is unusable.
+  std::vector<Limit> active;      ///< Limits that bind, of each joint.
+  std::vector<SafetyRow> safety;  ///< Clearance rows, the first num_safety_rows, most critical first.
   int num_safety_rows = 0;
-  int dominant = -1;         ///< the entry of `safety` that bends the motion most; -1 if none
-  int speed_frame = -1;      ///< the frame whose speed limit bends the motion most; -1: none
-  double speed_slack = 0.0;  ///< how far its row is missed [m/s²]; 0 unless limits of speed gave way
-  /// The least of all clearances given [m], exact, also without a row; inf: none.
+  int dominant = -1;         ///< Entry of `safety` that bends the motion most; -1: none.
+  int speed_frame = -1;      ///< Frame whose speed limit bends the motion most; -1: none.
+  double speed_slack = 0.0;  ///< Shortfall of its row [m/s²]; 0 unless speed limits gave way.
+  /// Smallest clearance given [m], exact, also without a row; inf: none.
   double least_clearance = std::numeric_limits<double>::infinity();
-  int least_coordinate = -1, least_nearest = -1;  ///< which clearance that is, and its nearest point; -1: none
+  int least_coordinate = -1, least_nearest = -1;  ///< Its coordinate, and its nearest point; -1: none.
 };
 
 }  // namespace sidestep

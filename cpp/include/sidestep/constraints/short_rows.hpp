@@ -12,7 +12,7 @@ class ShortRows {
   struct Row {
     RowBlock* block = nullptr;
     int k = 0;
-    double allowed = 0.0;  ///< shortfall [/s²] >= 0
+    double allowed = 0.0;  ///< Shortfall granted [/s²], >= 0.
 
     bool lost() const noexcept { return block->depths[k] > 0.0; }
     /// What the row asks for, less what is allowed; rounded: also where that is next to nothing.

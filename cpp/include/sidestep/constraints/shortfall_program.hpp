@@ -16,7 +16,7 @@ class ShortfallProgram {
   /// How a search ended: `any` is false where rows that never give way contradict each other.
   struct Found {
     bool any = true;
-    bool within_box = true;  ///< else the box was widened
+    bool within_box = true;  ///< Whether the box sufficed; otherwise it was widened.
   };
   /// Writes what is to be allowed, an acceleration that falls short by no more, and the multipliers.
   Found solve(const TrackingCost& cost, Bounds& bounds, std::vector<RowBlock>& blocks, ShortRows& short_rows,
@@ -41,13 +41,13 @@ class ShortfallProgram {
   bool widen(const TrackingCost& cost, const std::vector<RowBlock>& blocks, Bounds& bounds, TorqueSolution& solution) noexcept;
 
   int nv_;
-  std::vector<Program> programs_;  // by number of rows, so that the usual few stay cheap
+  std::vector<Program> programs_;  // Programs by number of rows, so that the usual few stay cheap.
   SpanCounter counter_;            // of the widening: over (q̈, what it is outside the box)
   Span box_, torque_;
   std::vector<Span> never_;
   QuadraticProgramData widening_data_;
   QuadraticProgram widening_;
-  Box everywhere_;  // without bounds
+  Box everywhere_;  // Box without bounds.
 };
 
 }  // namespace sidestep

@@ -24,7 +24,7 @@ class SlackProgram {
   SpanCounter variables_, counter_;
   Span acceleration_, slacks_, shared_slack_;
   Span upper_, lower_, torque_, short_;
-  std::vector<Span> comfort_, never_;  // of each block
+  std::vector<Span> comfort_, never_;  // Rows of each block, by priority.
   QuadraticProgramData data_;
   QuadraticProgram program_;
 };

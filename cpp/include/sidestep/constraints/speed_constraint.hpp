@@ -19,7 +19,7 @@ namespace sidestep {
 // to V₁ would ask for the most where the arm is fastest.
 //
 // One frame at p. Its speed s = |ṗ| changes by n·p̈ with n = ṗ/s, and p̈ = J q̈ + J̇ v. With V₊ the limit after this
-// period, the room V − s shrinks to no less than the share 1 − kT of it if
+// period, the difference V − s shrinks to no less than the share 1 − kT of it if
 //     n·J q̈ ≤ (V₊ − V)/T + k (V − s) − n·J̇ v,      k = 50/s, no more than half per period.
 // So a limit is neared without a step in acceleration (the jerk k n·p̈ is half of the default jerk limit), and where it
 // is exceeded (an obstacle that appears), the excess decays by k. V stands for 98 % of the limit: the rest is for terms of
@@ -30,10 +30,10 @@ namespace sidestep {
 // acceleration meets all rows. Where clearances or torque limits do not let it, rows give way together.
 
 struct SpeedLimitSettings {
-  double near_speed = 0.25;    ///< V₀ [m/s], kept at near_distance and nearer
-  double near_distance = 0.1;  ///< d₀ [m]
-  double far_speed = 1.5;      ///< V₁ [m/s], kept at far_distance and farther
-  double far_distance = 1.0;   ///< d₁ [m]
+  double near_speed = 0.25;    ///< Speed V₀ allowed at near_distance and nearer [m/s].
+  double near_distance = 0.1;  ///< Distance d₀ [m].
+  double far_speed = 1.5;      ///< Speed V₁ allowed at far_distance and farther [m/s].
+  double far_distance = 1.0;   ///< Distance d₁ [m].
 
   /// V [m/s] at a distance [m].
   double allowed(double distance) const noexcept;
@@ -57,7 +57,7 @@ class FrameSpeeds {
 
   struct Place {
     int frame, joint;
-    Eigen::Vector3d p;  // of the joint's child
+    Eigen::Vector3d p;  // Place in the joint's child [m].
   };
   const std::vector<Place>& places() const noexcept { return places_; }
 
@@ -77,7 +77,7 @@ class SpeedConstraint : public Constraint {
   void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
               TorqueSolution& solution) const noexcept override;
 
-  const std::vector<int>& frames() const noexcept { return frames_; }  ///< frame of each row
+  const std::vector<int>& frames() const noexcept { return frames_; }  ///< Frame of each row.
 
  private:
   FrameSpeeds speeds_;

@@ -12,9 +12,9 @@ template <class Settings>
 struct Field {
   const char* name;
   std::variant<double Settings::*, int Settings::*, bool Settings::*, std::uint64_t Settings::*> member;
-  const char* unit;    ///< for example "m"; "-" for none
-  double least, most;  ///< allowed, both ends included; infinity where there is no bound
-  const char* trades;  ///< one sentence: what it is, and what larger and smaller values trade
+  const char* unit;    ///< Unit, for example "m"; "-" for none.
+  double least, most;  ///< Allowed range, both ends included; infinity where there is no bound.
+  const char* trades;  ///< One sentence: what the setting is, and what larger and smaller values trade.
 };
 
 /// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning

@@ -23,11 +23,11 @@ const char* name(QuadraticProgramStatus status) noexcept;
 struct QuadraticProgramData {
   QuadraticProgramData(int num_variables, int num_rows);
 
-  Eigen::MatrixXd H;             ///< (n, n), symmetric positive definite; the lower triangle is read
-  Eigen::VectorXd g;             ///< (n)
-  Eigen::VectorXd lower, upper;  ///< (n)
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;  ///< (m, n)
-  Eigen::VectorXd row_lower, row_upper;                                      ///< (m)
+  Eigen::MatrixXd H;             ///< Cost matrix (n, n), symmetric positive definite; the lower triangle is read.
+  Eigen::VectorXd g;             ///< Cost vector (n).
+  Eigen::VectorXd lower, upper;  ///< Bounds of the variables (n).
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;  ///< Rows (m, n).
+  Eigen::VectorXd row_lower, row_upper;                                      ///< Bounds of the rows (m).
 };
 
 /// A dense strictly convex quadratic program of fixed size, solved by the dual active-set method.
@@ -66,8 +66,8 @@ class QuadraticProgram {
   struct Active {
     int constraint = 0;
     double sign = 1.0;
-    double rhs = 0.0;       // sign * (value of that side)
-    bool equality = false;  // never dropped, multiplier of any sign
+    double rhs = 0.0;       // Value of that side, times `sign`.
+    bool equality = false;  // Whether it is an equality: never dropped, multiplier of any sign.
   };
 
   bool factorise(const Eigen::MatrixXd& H) noexcept;
@@ -87,16 +87,16 @@ class QuadraticProgram {
   int n_, m_;
   int num_active_ = 0;
   int iterations_ = 0;
-  std::vector<Active> active_;   // (n), first num_active_ in use
-  std::vector<char> is_active_;  // (n + m)
+  std::vector<Active> active_;   // Active constraints (n), the first num_active_ in use.
+  std::vector<char> is_active_;  // Whether a constraint is active (n + m).
   Eigen::MatrixXd cholesky_;     // L of the coupled part, H = L L'
   Eigen::MatrixXd J_;            // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
   Eigen::MatrixXd R_;            // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
-  int num_coupled_ = 0;  // H is diagonal from here on
+  int num_coupled_ = 0;  // Size of the leading block of H that is not diagonal.
   // (m, n) where rows of A in use are not zero
   Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;
-  Eigen::VectorXi support_sizes_;  // (m)
+  Eigen::VectorXi support_sizes_;  // Number of nonzero entries of each row (m).
   Eigen::VectorXd row_norms_;      // |row| of A
   Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
   Eigen::VectorXd d_, r_, z_, y_;  // J' n, R^-1 d_1, step direction J_2 d_2, coordinates of x in J

@@ -37,7 +37,7 @@ class AvoidanceTrajectory {
  private:
   double reference_acceleration(Eigen::Index joint, double period) const noexcept;
 
-  Eigen::VectorXd fastest_, hardest_;  // V, A
+  Eigen::VectorXd fastest_, hardest_;  // V and A of each joint.
   Eigen::VectorXd target_, position_, velocity_;
 };
 

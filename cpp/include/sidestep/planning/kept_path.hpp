@@ -35,7 +35,7 @@ class KeptPath {
 
  private:
   Eigen::MatrixXd waypoints_;
-  Eigen::VectorXd stations_;  // of the waypoints
+  Eigen::VectorXd stations_;  // Stations of the waypoints.
   Margins margins_;
   std::optional<RoundedPath> rounded_;
   std::shared_ptr<const TimedPath> motion_;

@@ -21,15 +21,15 @@
 namespace sidestep {
 
 struct LookAheadSettings {
-  double horizon = 2.0;      ///< [s] how far is looked ahead
-  double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
-  double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
-  double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
-  int tries = 500;           ///< trajectories that are drawn in one look
+  double horizon = 2.0;      ///< Duration that is predicted [s].
+  double period = 0.01;      ///< Time step of the predicted motions [s]; shortened so that `delay` is a multiple of it.
+  double delay = 0.1;        ///< Time from one look to the next [s]; from then on its result is followed.
+  double clearance = 0.004;  ///< Clearance from obstacles that a motion must keep [m].
+  int tries = 500;           ///< Trajectories that one look draws.
   std::uint64_t seed = 0;
   // Of a Controller whose look-ahead runs in a thread. With enough processor time a look is at most two delays and one wake-up old.
-  double slow_after = 3.0;   ///< age of a look from which the arm is slowed, in delays
-  double rest_after = 10.0;  ///< age of a look at which the arm rests, in delays: 1 s, in which a person walks 1.6 m
+  double slow_after = 3.0;   ///< Age of a look from which the arm is slowed, in delays.
+  double rest_after = 10.0;  ///< Age of a look at which the arm rests, in delays: 1 s, in which a person walks 1.6 m.
 
   /// The share of its speed that an arm may move at beside what moves, with a look of this age [s]: 1 up to slow_after delays,
   /// then linear, to 0 at rest_after.
@@ -116,7 +116,7 @@ class LookAhead {
   /// What integrates motions by a period [s].
   struct Stepper {
     double period;
-    MotionProgram program;  // by torque where the dynamics are given
+    MotionProgram program;  // Program of the arm; by torque if the dynamics are given.
     int steps = 0;          // integrated so far
 
     Stepper(const Robot& robot, double period, bool by_torque);
@@ -139,14 +139,14 @@ class LookAhead {
   std::shared_ptr<const GeometricSystem> system_;
   LookAheadSettings settings_;
   GeometricSystem::Workspace workspace_;
-  int periods_;  // of a delay
+  int periods_;  // Periods of a delay.
   std::optional<RigidBodyDynamics> dynamics_;
   std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
-  Eigen::MatrixXd mass_;  // of the state that is looked at
+  Eigen::MatrixXd mass_;  // Mass matrix of the predicted state.
   Eigen::VectorXd bias_;
   Stepper fine_, coarse_;
   TorqueSolution filtered_;
-  std::vector<Eigen::Index> of_obstacles_;  // coordinates
+  std::vector<Eigen::Index> of_obstacles_;  // Coordinates of obstacles.
   std::mt19937_64 random_;
   std::optional<AvoidanceTrajectory> found_, pursued_;
   double until_look_ = 0.0;

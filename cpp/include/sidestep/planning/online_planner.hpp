@@ -71,8 +71,8 @@ class OnlinePlanner {
     bool arrives = false;
   };
 
-  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: barriers that leave room at
-  /// places are for what rests. For the loop; allocates nothing.
+  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: activation distances shrink
+  /// only near static obstacles. For the loop; allocates nothing.
   [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
   /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status
@@ -146,8 +146,8 @@ class OnlinePlanner {
   ProgressMonitor progress_;
   TimedPathFollower follower_;
   std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;
-  double looked_at_ = -std::numeric_limits<double>::infinity();  // time of the newest state that was looked at [s]
-  double look_excess_ = 0.0;  // by which that look took longer by the machine's clock than by the steps' [s]
+  double looked_at_ = -std::numeric_limits<double>::infinity();  // Time of the newest state that was checked [s].
+  double look_excess_ = 0.0;  // Duration of that check by the machine's clock, beyond that by the steps' [s].
   ClearanceQuery::Workspace here_;
 
   // Of the planner's thread.

@@ -17,9 +17,9 @@ namespace sidestep {
 struct OnlinePlannerSettings {
   PlannerSettings search = {};
   TimedPathSettings route = {};
-  double period = 0.02;   ///< between two looks at the scene [s]
-  double patience = 1.0;  ///< without progress until it plans again [s]
-  double retry = 1.0;     ///< until a failed search is repeated in the same scene [s]
+  double period = 0.02;   ///< Time between two checks of the scene [s].
+  double patience = 1.0;  ///< Time without progress until it plans again [s].
+  double retry = 1.0;     ///< Time until a failed search is repeated in the same scene [s].
 };
 template <>
 const std::vector<Field<OnlinePlannerSettings>>& fields();
@@ -27,14 +27,16 @@ const std::vector<Field<OnlinePlannerSettings>>& fields();
 /// What an OnlinePlanner is made for.
 struct OnlinePlannerConfig {
   OnlinePlannerSettings planner = {};
-  std::optional<RigidBodyDynamics> dynamics;  ///< of an arm that is moved by torque: paths are timed for its motors
-  SafetySettings safety = {};  ///< of what follows: margin, rate and braking_fraction bound the speed near obstacles
-  double tolerance = 0.05;     ///< it has arrived once every joint is this close to the goal [rad | m]
-  double duration = std::numeric_limits<double>::infinity();  ///< allowed for a motion [s]
+  std::optional<RigidBodyDynamics> dynamics;  ///< Dynamics of an arm that is moved by torque: paths are timed for its motors.
+  /// Clearance settings of the controller: margin, rate and braking_fraction bound the speed near obstacles.
+  SafetySettings safety = {};
+  double tolerance = 0.05;                                    ///< Largest joint error at the goal [rad | m].
+  double duration = std::numeric_limits<double>::infinity();  ///< Longest duration of a motion [s].
   std::uint64_t seed = 0;
-  /// Plans in `step()`, at times given by the planner's period alone, so that a motion is the same every time; else in a thread.
+  /// Whether it plans in `step()`, at times given by the planner's period alone, so that a motion is the same every time;
+  /// otherwise in a thread.
   bool synchronous = false;
-  /// Plans at all, where it is not synchronous. Without, the loop takes over what `give` hands it: for replays.
+  /// Whether it plans at all, if not synchronous. Without, the loop takes over what `give` hands it: for replays.
   bool works = true;
 
   /// Throws std::invalid_argument that names the setting at fault.

@@ -24,7 +24,7 @@ namespace sidestep {
 class PathKeeper {
  public:
   using State = PlannerExchange::State;
-  /// Way within the patience below which the arm is stuck [rad | m]; on a slow path less.
+  /// Progress within the patience below which the arm counts as stuck [rad | m]; on a slow path less.
   static constexpr double usual_progress = 0.0202;
 
   /// All of them must outlive the keeper.
@@ -63,14 +63,14 @@ class PathKeeper {
   PlannerExchange& exchange_;
   RrtConnect search_;
   KeptPath path_;
-  std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
+  std::shared_ptr<const Obstacles> obstacles_;  // Obstacles among which it plans.
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, path_number_ = 0, searches_ = 0;
-  bool newer_ = false;  // a state was taken that it has not looked at
+  bool newer_ = false;  // Whether a state arrived that it has not checked.
   bool have_path_ = false, direct_ = false, failed_ = false;
-  bool changed_ = false;  // the scene, since the path was last looked at
+  bool changed_ = false;  // Whether the scene has changed since the path was last checked.
   bool improving_ = false, overtaken_ = false;
   std::uint64_t watched_scene_ = 0;
-  ClearanceQuery::Workspace watch_;  // as the search's is in use then
+  ClearanceQuery::Workspace watch_;  // Workspace of its own, since that of the search is in use then.
   double margin_, failed_at_ = 0.0;
   PlanStatus status_ = PlanStatus::no_path;
 };

@@ -48,8 +48,8 @@ class RoundedPath {
                       ClearanceQuery::Workspace& workspace) const;
 
   std::vector<Eigen::VectorXd> waypoints_, directions_;
-  std::vector<double> starts_;   // stations of the waypoints
-  std::vector<Corner> corners_;  // between edge k and k + 1
+  std::vector<double> starts_;   // Stations of the waypoints.
+  std::vector<Corner> corners_;  // Corners, between edge k and k + 1.
 };
 
 }  // namespace sidestep

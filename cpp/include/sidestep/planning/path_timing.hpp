@@ -13,9 +13,9 @@ struct PathLimits {
 
 /// A motion along a path, as fast as limits allow, at samples that are `period` apart.
 struct PathTiming {
-  double period = 0.0;      ///< [s]
-  Eigen::MatrixXd q, v, a;  ///< (nv × K)
-  Eigen::VectorXd station;  ///< (K), ascending
+  double period = 0.0;      ///< Sampling period [s].
+  Eigen::MatrixXd q, v, a;  ///< Samples (nv × K).
+  Eigen::VectorXd station;  ///< Stations (K), ascending.
 
   /// The shortest way along the path [rad | m] in any span of the motion that lasts so long [s]; infinity for a shorter motion.
   double slowest(double duration) const noexcept;

@@ -23,10 +23,10 @@ const char* name(PlanStatus status) noexcept;
 
 /// What is in the way at an end of a motion.
 struct Obstruction {
-  CoordinateLabel label;  ///< kind, link, and the other link of a pair
-  int point = -1;         ///< which obstacle point; -1 for a pair or a plane
-  double depth = 0.0;     ///< how far the covering ellipsoids reach into each other or into the obstacle [m]
-  std::string obstacle;   ///< what messages call the obstacle, see Obstacles::words_for; empty for a pair or a plane
+  CoordinateLabel label;  ///< Kind, link, and the other link of a pair.
+  int point = -1;         ///< Index of the obstacle point; -1 for a pair or a plane.
+  double depth = 0.0;     ///< Depth of the covering ellipsoids in each other or in the obstacle [m].
+  std::string obstacle;   ///< Name of the obstacle in messages, see Obstacles::words_for; empty for a pair or a plane.
 };
 
 /// For example "link 'hand' is 31 mm deep in 'table'", or "links 'hand' and 'forearm' touch, 12 mm deep".
@@ -35,15 +35,16 @@ std::string describe(const Obstruction& obstruction);
 /// A path, or why there is none.
 struct Plan {
   PlanStatus status = PlanStatus::invalid;
-  Eigen::MatrixXd path;  ///< (nv × W) waypoints from start, or where a moving arm is then, to goal, straight between
-  double margin = 0.0;   ///< [m] that it keeps, but for the ends, see Margins
+  /// Waypoints (nv × W) from the start, or from where a moving arm is then, to the goal, straight in between.
+  Eigen::MatrixXd path;
+  double margin = 0.0;  ///< Margin that the path keeps [m], except near its ends, see Margins.
   Obstruction obstruction;
   // The budget spent.
-  int nodes = 0;  ///< of both trees
+  int nodes = 0;  ///< Nodes of both trees.
   int iterations = 0;
-  std::int64_t checks = 0;           ///< see PlannerSettings; improvement included
-  double search_seconds = 0.0;       ///< until a path was found
-  double improvement_seconds = 0.0;  ///< to look for a wider one, and to make it short
+  std::int64_t checks = 0;           ///< Checks, see PlannerSettings; improvement included.
+  double search_seconds = 0.0;       ///< Time until a path was found [s].
+  double improvement_seconds = 0.0;  ///< Time to search a wider path and to shorten it [s].
 };
 
 /// Length of a path: Σ |Δq|, joints in radians and metres alike.

@@ -21,9 +21,9 @@ class PlannerExchange {
   struct State {
     Eigen::VectorXd q, v, goal;
     double time = 0.0, station = 0.0;
-    std::uint64_t goal_number = 0;   // 0: none
-    std::uint64_t route_number = 0;  // that it follows
-    std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
+    std::uint64_t goal_number = 0;   // Number of the goal; 0: none.
+    std::uint64_t route_number = 0;  // Number of the route that it follows.
+    std::uint64_t stops = 0;         // Number of times that the arm was stuck on the way to this goal.
     std::chrono::steady_clock::time_point written{};
   };
 
@@ -31,12 +31,12 @@ class PlannerExchange {
   struct Answer {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
-    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
-    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
+    double progress = 0.0;                   // Progress on the route that is required within the patience [rad | m].
+    std::shared_ptr<const TimedPath> route;  // Route, kept alive by the planner's side: a slot is only overwritten there.
   };
-  /// The newest state that was looked at, and for how long.
+  /// Time of the newest state that was checked, and duration of the check.
   struct Looked {
-    double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the latter by the machine's clock
+    double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the duration by the machine's clock.
   };
 
   /// How often the planner searched for a path, and how often it found one.
@@ -64,7 +64,7 @@ class PlannerExchange {
   std::shared_ptr<const TimedPath> route(std::uint64_t number) const;
 
  private:
-  mutable std::mutex mutex_;  // of what follows; the loop never takes it
+  mutable std::mutex mutex_;  // Guards what follows; the loop never takes it.
   std::shared_ptr<const Obstacles> newest_;
   std::uint64_t scene_number_ = 0;
   Plan plan_;

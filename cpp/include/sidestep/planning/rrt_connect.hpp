@@ -15,22 +15,23 @@
 namespace sidestep {
 
 struct PlannerSettings {
-  double margin = 0.06;  ///< clearance of a wide way, on which barriers hardly act [m]
-  double floor = 0.005;  ///< clearance that the first way keeps, and every one [m]
-  /// how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
+  double margin = 0.06;  ///< Clearance of a wide path, on which barriers hardly act [m].
+  double floor = 0.005;  ///< Clearance of the first path, and least clearance of every path [m].
+  /// Largest depth at start or goal [m]: an ellipsoid is larger than its link.
   double allowance = 0.02;
-  double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
-  double slack = 0.002;          ///< see Margins, at least; else a quarter of the margin [m]
-  double fade = 0.3;             ///< see Margins [m]
-  /// longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
+  /// Largest distance of the gap of two links below its contact (see LinkPair) at start or goal [m].
+  double pair_allowance = 0.02;
+  double slack = 0.002;  ///< Least slack [m], see Margins; usually a quarter of the margin.
+  double fade = 0.3;     ///< Fade of the margins [m], see Margins.
+  /// Longest edge of the trees [rad | m], with joints weighted by how far they reach, see RrtConnect.
   double range = 1.0;
-  int max_nodes = 10000;  ///< of both trees
+  int max_nodes = 10000;  ///< Largest number of nodes of both trees.
   int max_iterations = 40000;
   /// The work of a whole plan, some 2 s on any machine: clearances of single items; a thousand nodes looked through count
   /// as one.
   int max_checks = 2000000;
   double max_seconds = std::numeric_limits<double>::infinity();
-  int shortcuts = 100;  ///< attempts to shorten a path
+  int shortcuts = 100;  ///< Attempts to shorten a path.
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -110,7 +111,7 @@ class RrtConnect {
   const ClearanceQuery* body_;
   PlannerSettings settings_;
   ClearanceQuery::Workspace workspace_;
-  std::int64_t nodes_looked_through_ = 0, work_before_ = 0;  // the latter: before the plan under way
+  std::int64_t nodes_looked_through_ = 0, work_before_ = 0;  // Work so far; before the current plan.
   Interrupted interrupted_ = never_interrupted;
   SearchTree from_start_, from_goal_;
   Eigen::VectorXd sample_, next_, near_, clearances_;

@@ -37,7 +37,7 @@ class SearchTree {
  private:
   int size_ = 0, capacity_;
   Eigen::VectorXd weights_;
-  Eigen::MatrixXd nodes_;  // (nv × capacity)
+  Eigen::MatrixXd nodes_;  // Configurations (nv × capacity).
   // (capacity × nv), weighted: a run per coordinate, for the scan
   Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;
   Eigen::ArrayXf distances_;

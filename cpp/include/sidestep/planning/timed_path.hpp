@@ -11,9 +11,9 @@
 namespace sidestep {
 
 struct TimedPathSettings {
-  double speed = 1.0;  ///< share of the velocity and acceleration limits; a Controller sets it to its own
-  double wide = 0.03;  ///< clearance below which a place is narrow [m]
-  double lead = 0.4;   ///< |q − q*| at which it waits for the arm [rad]
+  double speed = 1.0;  ///< Share of the velocity and acceleration limits [-]; a Controller sets it to its own.
+  double wide = 0.03;  ///< Clearance below which a place is narrow [m].
+  double lead = 0.4;   ///< Distance |q − q*| at which the reference waits for the arm [rad].
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -29,9 +29,9 @@ PathLimits path_limits(const JointLimits& limits, double speed);
 /// A path as a motion: where the reference is at which time, and how narrow the path is.
 struct TimedPath {
   PathTiming motion;
-  Eigen::MatrixXd places;         ///< (nv × P) 0.05 rad apart
-  Eigen::VectorXd place_station;  ///< (P) length of the path up to each [rad]
-  Eigen::VectorXd clearance;      ///< (P) not above 0.1 m; zero where it was not measured
+  Eigen::MatrixXd places;         ///< Configurations (nv × P), 0.05 rad apart.
+  Eigen::VectorXd place_station;  ///< Length of the path up to each (P) [rad].
+  Eigen::VectorXd clearance;      ///< Clearance of each (P) [m], at most 0.1 m; zero where it was not measured.
   PathLimits limits;
 
   double length() const noexcept { return motion.station[motion.station.size() - 1]; }
@@ -56,16 +56,16 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Cl
 
 /// Where the reference is on a timed path: at a time of the motion, which goes more slowly as the reference gets ahead of the arm.
 struct TimedPathFollower {
-  double time = 0.0;     ///< of the motion [s]
-  double pace = 1.0;     ///< r, how fast that goes, in [0, 1]
-  double change = 0.0;   ///< dr/dt [1/s]
-  double station = 0.0;  ///< where it is then [rad]
-  double most = 1.0;     ///< r that is allowed, >= 0
+  double time = 0.0;     ///< Time of the motion [s].
+  double pace = 1.0;     ///< Pace r of that time, in [0, 1].
+  double change = 0.0;   ///< dr/dt [1/s].
+  double station = 0.0;  ///< Station at that time [rad].
+  double most = 1.0;     ///< Largest r allowed, >= 0.
 
   /// Onto a new path, at the sample nearest to q in the first radian, as fast as the arm moves along it at v (nv).
   void enter(const TimedPath& route, ConstVectorRef q, ConstVectorRef v) noexcept;
 
-  static constexpr Eigen::Index most_places = 5;
+  static constexpr Eigen::Index most_places = 5;  // Most narrow places that are passed on.
   /// The narrow places between the reference and as far behind it as the arm may be, or every second, third, … of them:
   /// writes them into the columns of (nv × most_places), and says how many they are.
   Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings,

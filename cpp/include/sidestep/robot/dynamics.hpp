@@ -11,9 +11,9 @@ namespace sidestep {
 
 /// Mass properties of a rigid body, in the frame of that body.
 struct Inertial {
-  double mass = 0.0;                                  ///< [kg]
-  Eigen::Vector3d com = Eigen::Vector3d::Zero();      ///< centre of mass [m]
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< rotational inertia about the centre of mass [kg m^2]
+  double mass = 0.0;                                  ///< Mass [kg].
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();      ///< Centre of mass [m].
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< Rotational inertia about the centre of mass [kg m^2].
 
   /// Throws std::invalid_argument that names `owner` and the quantity at fault. The mass is not negative; the
   /// rotational inertia is symmetric and positive semidefinite.

@@ -39,14 +39,14 @@ class KinematicState {
   void update(const Robot& robot, ConstVectorRef q, ConstVectorRef v) noexcept;
 
   struct alignas(64) Link {
-    int parent;            ///< index of the parent joint, -1 for the base
-    int coordinate;        ///< which entry of q drives the joint
-    Eigen::Matrix3d R_WL;  ///< orientation in the world
-    Eigen::Vector3d p_WL;  ///< origin in the world [m]
-    SpatialMotion screw;   ///< column of the Jacobian of this joint's own coordinate (multiplier included)
+    int parent;            ///< Index of the parent joint; -1 for the base.
+    int coordinate;        ///< Entry of q that drives the joint.
+    Eigen::Matrix3d R_WL;  ///< Orientation in the world.
+    Eigen::Vector3d p_WL;  ///< Origin in the world [m].
+    SpatialMotion screw;   ///< Column of the Jacobian of this joint's own coordinate (multiplier included).
     SpatialMotion velocity;
     SpatialMotion bias;
-    double unused = 0.0;  ///< inner loops write here what they have too much of
+    double unused = 0.0;  ///< Padding that inner loops may overwrite.
 
     /// The numbers from R_WL (by columns) to bias, one after the other, as inner loops read and write them.
     const double* numbers() const noexcept { return R_WL.data(); }
@@ -59,7 +59,7 @@ class KinematicState {
   int num_links() const noexcept { return static_cast<int>(links_.size()); }
 
  private:
-  struct Joints;  // what of the joints does not change, as the inner loop reads it
+  struct Joints;  // Constants of the joints, as the inner loop reads them.
 
   Eigen::VectorXd q_, v_;
   std::vector<Link> links_;

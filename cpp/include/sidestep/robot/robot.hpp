@@ -21,12 +21,12 @@ enum class JointType { revolute, prismatic };
 struct Joint {
   std::string name;
   JointType type = JointType::revolute;
-  int parent = -1;                                         ///< index of the parent joint, -1 for the base
-  Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();  ///< placement at zero motion, in the parent's frame
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();         ///< unit axis in the joint frame
-  int coordinate = 0;                                      ///< which entry of q drives the joint
-  double multiplier = 1.0;                                 ///< of a mimic joint
-  double offset = 0.0;                                     ///< of a mimic joint, [rad] or [m]
+  int parent = -1;                                         ///< Index of the parent joint; -1 for the base.
+  Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();  ///< Placement at zero motion, in the parent's frame.
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();         ///< Unit axis in the joint frame.
+  int coordinate = 0;                                      ///< Entry of q that drives the joint.
+  double multiplier = 1.0;                                 ///< Factor of a mimic joint [-].
+  double offset = 0.0;                                     ///< Offset of a mimic joint [rad | m].
 };
 
 /// A named frame (a URDF link) rigidly attached to the child of a joint, or to the world when `joint` is -1.
@@ -40,10 +40,11 @@ struct Frame {
 /// of effort [Nm/s | N/s]. Position bounds may be infinite; the others are positive, possibly infinite.
 /// Left empty, jerk is `default_jerk` times the acceleration limit, and the rate of effort infinite.
 struct JointLimits {
-  /// [1/s] Ten milliseconds until the whole acceleration: no description says it, and drives that state theirs allow more.
+  /// Jerk limit over acceleration limit where none is given [1/s]: the whole acceleration builds up in 10 ms. Descriptions
+  /// state no jerk limits, and drives that state theirs allow more.
   static constexpr double default_jerk = 100.0;
-  /// [rad | m] by which a measured or published configuration may be outside the position limits: encoders and rounding are. It is
-  /// taken in as the nearest one within.
+  /// Distance outside the position limits at which a configuration still counts as inside [rad | m]: encoders and published
+  /// values are rounded. The nearest one inside stands for it.
   static constexpr double rounding = 1e-3;
 
   Eigen::VectorXd lower, upper, velocity, acceleration, effort;

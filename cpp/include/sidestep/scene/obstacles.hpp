@@ -15,7 +15,7 @@ namespace sidestep {
 /// Obstacle points in the world, each a ball with a radius that may be zero, moving with a constant velocity.
 class Obstacles {
  public:
-  /// [m]: single precision still holds what queries make of a ball as large.
+  /// Largest radius of a ball [m]: single precision still holds what queries compute from it.
   static constexpr double largest_radius = 1e9;
 
   /// points (3 × N) [m], radii (N) [m] >= 0 and at most `largest_radius`, velocities (3 × N) [m/s]; all finite and N >=

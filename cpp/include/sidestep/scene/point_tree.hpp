@@ -45,7 +45,7 @@ class PointTree {
   const double* coordinate(int axis) const noexcept { return columns_[static_cast<std::size_t>(axis)].data(); }
   const double* radii() const noexcept { return columns_[3].data(); }
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
-  static constexpr double padding = 1e9;  ///< [m], out of every reach
+  static constexpr double padding = 1e9;  ///< Coordinate of padding points [m], beyond every reach.
 
   /// Of the leaves, around the same centres; leaf k holds the points from k `leaf_size` on. Not of a tree without
   /// points.
@@ -54,7 +54,7 @@ class PointTree {
 
   struct Nearest {
     double distance;
-    int point;  ///< in tree order; -1: none
+    int point;  ///< Index in tree order; -1: none.
   };
 
   /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
@@ -100,7 +100,7 @@ class PointTree {
   /// The balls and boxes of all nodes, around the same centres, with space to read whole groups of `fan_out` nodes.
   struct Level {
     int size;
-    std::array<std::vector<double>, 3> centre, half;  // of the boxes of the points
+    std::array<std::vector<double>, 3> centre, half;  // Centres and half sizes of the boxes around the points.
     std::vector<double> largest;                      // radius of a point
     std::vector<double> radius;                       // of the balls
 

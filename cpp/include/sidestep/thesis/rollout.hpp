@@ -16,21 +16,21 @@ enum class Integrator {
 };
 
 struct RolloutSettings {
-  double period = 0.001;  ///< dt [s]
+  double period = 0.001;  ///< Time step dt [s].
   int steps = 1000;
   Integrator integrator = Integrator::semi_implicit_euler;
-  bool time_steps = false;                      ///< measure the acceleration of each step
-  Interrupted interrupted = never_interrupted;  ///< asked before every step
+  bool time_steps = false;                      ///< Whether to measure the computing time of each step.
+  Interrupted interrupted = never_interrupted;  ///< Asked before every step; ends the rollout when true.
 };
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
 struct Rollout {
-  Eigen::VectorXd time;                ///< [s]
-  Eigen::MatrixXd q, v, acceleration;  ///< (steps + 1, nv)
-  Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back
-  Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv), the same
-  std::vector<StepStatus> statuses;    ///< one per row
-  Eigen::VectorXd step_seconds;        ///< [s] that the acceleration of each row took; empty if not asked for
+  Eigen::VectorXd time;                ///< Times [s].
+  Eigen::MatrixXd q, v, acceleration;  ///< States and accelerations (steps + 1, nv).
+  Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back.
+  Eigen::MatrixXd switch_weights;      ///< Switch weights (steps + 1, nv), NaN likewise.
+  std::vector<StepStatus> statuses;    ///< Status of each row.
+  Eigen::VectorXd step_seconds;        ///< Computing time of each row's acceleration [s]; empty if not measured.
 };
 
 /// Integrates the system alone from (q, v), obstacles and goal moving at their velocities: nothing holds limits or
