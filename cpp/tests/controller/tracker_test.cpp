@@ -1,0 +1,125 @@
+// Feedback that makes the arm follow its reference, alone.
+#include <boost/test/unit_test.hpp>
+#include <stdexcept>
+
+#include "../../src/controller/tracker.hpp"
+#include "support/numbers.hpp"
+#include "support/stage_model.hpp"
+
+using namespace sidestep;
+using Output = ControllerSettings::Output;
+
+namespace {
+
+constexpr double tracked = 1e-9;  // accuracy of what the program solves exactly
+
+/// The stage with an arm of two joints: 10 rad/s² and 1000 rad/s³ less 2 %.
+struct Tracking {
+  explicit Tracking(Output output, double effort_rate = test::infinity)
+      : model(arm(effort_rate), test::straight_settings(output)),
+        dynamics(model.dynamics, model.arm.robot(), model.settings, model.torque),
+        tracker(model.arm.robot(), model.joints, model.settings, model.torque, 0) {
+    dynamics.update(test::state_at(model.arm.robot(), q), {});
+  }
+  static Arm arm(double effort_rate) {
+    JointLimits limits = test::arm_limits(2);
+    limits.jerk.setConstant(1000.0);
+    limits.effort_rate.setConstant(effort_rate);
+    return test::covered_arm(limits);
+  }
+  TorqueStatus track(const Reference& reference, TorqueStatus decided = TorqueStatus::ok) {
+    const double error = (reference.q - q).cwiseAbs().maxCoeff();
+    return tracker.track(reference, {q, v, seen, dynamics, last, nullptr}, error, decided);
+  }
+
+  const ControllerModel model;
+  ArmDynamics dynamics;
+  Tracker tracker;
+  Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), v = Eigen::Vector2d(0.1, -0.1);
+  const Clearances seen{2, model.system->num_embedding_coordinates()};
+  LastOutput last{2};
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(feedback_is_a_damped_spring_around_the_reference) {
+  Tracking t(Output::acceleration);
+  Reference reference = test::reference_at(t.q + Eigen::Vector2d(0.001, -0.0005), t.v + Eigen::Vector2d(0.01, 0.02));
+  reference.a = Eigen::Vector2d(0.5, -1.0);
+  const double w = t.model.settings.tracking.frequency;
+  const Eigen::VectorXd expected =  // 5.3 and −0.4 rad/s²
+      reference.a + w * w * (reference.q - t.q) + 2.0 * t.model.settings.tracking.damping * w * (reference.v - t.v);
+  t.last.acceleration = expected;  // jerk is in no way
+  BOOST_TEST((t.track(reference) == TorqueStatus::ok));
+  BOOST_TEST((t.tracker.solution().acceleration - expected).norm() < tracked);
+  t.last.acceleration.setZero();
+  static_cast<void>(t.track(reference));
+  BOOST_TEST((t.tracker.solution().acceleration - Eigen::Vector2d(0.98, expected[1])).norm() < tracked);  // jerk
+  BOOST_TEST((t.track(reference, TorqueStatus::relaxed) == TorqueStatus::relaxed));  // what was decided stays
+}
+
+BOOST_AUTO_TEST_CASE(an_arm_that_cannot_follow_draws_the_reference_to_itself_beyond_what_is_free) {
+  Tracking t(Output::acceleration), drives(Output::position);
+  const Reference reference = test::reference_at(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d::Zero());
+  Eigen::VectorXd coupling(2);
+  // A fifth of the largest error of 0.2 rad is free.
+  t.tracker.write_coupling(reference, Eigen::Vector2d(0.05, -0.039), coupling);
+  BOOST_TEST((coupling - Eigen::Vector2d(3600.0 * 0.01, 0.0)).norm() < 1e-11);  // rounding of 60² times 1e-15
+  t.tracker.write_coupling(reference, Eigen::Vector2d(-0.06, 0.0), coupling);
+  BOOST_TEST((coupling - Eigen::Vector2d(-3600.0 * 0.02, 0.0)).norm() < 1e-11);
+  drives.tracker.write_coupling(reference, Eigen::Vector2d(0.5, 0.5), coupling);
+  BOOST_TEST(coupling.isZero(0.0));  // its drives track the reference
+}
+
+BOOST_AUTO_TEST_CASE(a_torque_from_elsewhere_keeps_its_rate_and_the_acceleration_says_what_it_does) {
+  Tracking t(Output::torque, 1000.0);  // 1 Nm in a period
+  t.last.torque = Eigen::Vector2d(5.0, 5.0);
+  Eigen::VectorXd torque = Eigen::Vector2d(8.0, 4.5);
+  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, torque));  // there was none before
+  t.last.has_torque = true;
+  t.tracker.solution().acceleration = Eigen::Vector2d(1.0, 2.0);
+  BOOST_TEST(t.tracker.keep_torque_rate(t.last, t.dynamics, torque));
+  BOOST_TEST((torque == Eigen::Vector2d(6.0, 4.5)));
+  const Eigen::VectorXd change = t.dynamics.mass().inverse() * Eigen::Vector2d(-2.0, 0.0);
+  const Eigen::VectorXd expected = Eigen::Vector2d(1.0, 2.0) + change;
+  BOOST_TEST((t.tracker.solution().acceleration - expected).norm() <
+             1e-9 * change.norm());  // of a mass matrix of condition 100
+  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, torque));
+}
+
+BOOST_AUTO_TEST_CASE(a_velocity_leads_a_drifting_arm_back_no_faster_than_its_limits_allow) {
+  Tracking t(Output::velocity);
+  Reference reference = test::reference_at(Eigen::Vector2d(0.1, 0.1), Eigen::Vector2d(0.5, 0.0));
+  Eigen::VectorXd velocity(2);
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.099, 0.1), true, velocity);
+  BOOST_TEST((velocity - Eigen::Vector2d(0.502, 0.0)).norm() < 1e-15);  // gain 2/s times 1 mrad; rounding
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, velocity);
+  BOOST_TEST((velocity - Eigen::Vector2d(0.512, 0.0)).norm() < 1e-15);  // 10 rad/s² for 1 ms more than the last
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), false, velocity);
+  BOOST_TEST((velocity - Eigen::Vector2d(0.502, 0.0)).norm() < 1e-15);  // where the arm is, nobody knows: back
+  t.tracker.begin_anew();
+  reference = test::reference_at(Eigen::Vector2d(0.1, 0.1), Eigen::Vector2d(2.5, 0.0));
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, velocity);
+  BOOST_TEST(velocity[0] == 2.5);  // the limit
+}
+
+BOOST_AUTO_TEST_CASE(an_impedance_is_a_spring_of_torque_for_arms_that_are_moved_by_it) {
+  ControllerSettings settings = test::straight_settings(Output::torque);
+  settings.tracking.stiffness = 0.5;
+  const ControllerModel model = test::stage_model(2, settings);
+  ArmDynamics dynamics(model.dynamics, model.arm.robot(), model.settings, true);
+  Tracker tracker(model.arm.robot(), model.joints, model.settings, true, 0);
+  const Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), rest = Eigen::Vector2d::Zero();
+  dynamics.update(test::state_at(model.arm.robot(), q), {});
+  const Eigen::VectorXd error = Eigen::Vector2d(0.001, -0.002);
+  const Reference reference = test::reference_at(q + error, rest);
+  const Clearances seen(2, model.system->num_embedding_coordinates());
+  const LastOutput last(2);
+  static_cast<void>(tracker.track(reference, {q, rest, seen, dynamics, last, nullptr}, 0.002, TorqueStatus::ok));
+  // At rest K e + h is sent, K half of the effort limits per rad. The price of torque takes 1e-8 rad/s² of tracking at 1 kg m².
+  const Eigen::VectorXd sent = 0.5 * model.arm.robot().limits().effort.cwiseProduct(error) + dynamics.bias();
+  BOOST_TEST((tracker.solution().torque - sent).norm() < 1e-6);
+  ControllerSettings position = test::straight_settings(Output::position);
+  position.tracking.stiffness = 0.5;
+  BOOST_CHECK_THROW(Tracker(model.arm.robot(), model.joints, position, false, 0), std::invalid_argument);
+}
