@@ -17,7 +17,7 @@ struct Programming {
   explicit Programming(Output output)
       : model(test::stage_model(2, test::straight_settings(output))),
         dynamics(model.dynamics, model.arm.robot(), model.settings, model.torque),
-        program(within_margins(model.arm.robot(), model.settings, 1.0), model.settings, model.torque, 0) {}
+        program(within_margins(model.arm.robot(), model.settings, 1.0), model.settings, model.torque) {}
 
   const ControllerModel model;
   ArmDynamics dynamics;

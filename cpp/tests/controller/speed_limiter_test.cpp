@@ -22,13 +22,14 @@ struct Limiting {
     }
     return s;
   }
-  std::optional<double> update(double distance, bool known_before, bool apart = false) {
+  std::optional<double> update(double distance, bool known_before) {
     const Obstacles ball = test::ball({0.04 + distance + 0.1, 0.0, 0.75}, 0.1);  // the link's half width is 0.04 m
-    return limiter.update(moving, moving, apart, upright, ball, known_before, command);
+    return limiter.update(resting, moving, upright, ball, known_before, command);
   }
 
   const ControllerModel model;
   const Eigen::VectorXd upright = Eigen::VectorXd::Zero(2);
+  const KinematicState resting = test::state_at(model.arm.robot(), upright);
   KinematicState moving{model.arm.robot()};
   SpeedLimiter limiter{model.body, model.settings};
   Command command{2};
@@ -41,9 +42,8 @@ BOOST_AUTO_TEST_CASE(without_limits_the_speed_is_reported_and_nothing_slowed) {
   BOOST_TEST(!l.update(0.2, false).has_value());
   BOOST_TEST(std::abs(l.command.speed - 0.3) < 1e-15);  // rounding
   BOOST_TEST(l.command.speed_limit == test::infinity);
-  BOOST_TEST((l.limiter.rows() == nullptr));
-  BOOST_TEST((l.limiter.rows_of_arm() == nullptr));
-  BOOST_TEST(l.limiter.max_rows() == 0);
+  BOOST_TEST((l.limiter.at_reference().state == nullptr));
+  BOOST_TEST((l.limiter.at_arm().state == nullptr));
 }
 
 BOOST_AUTO_TEST_CASE(the_limit_is_that_of_the_distance_now_and_the_path_slows_ahead_of_what_closes) {
@@ -59,18 +59,23 @@ BOOST_AUTO_TEST_CASE(the_limit_is_that_of_the_distance_now_and_the_path_slows_ah
   BOOST_TEST(std::abs(*closing - limits.allowed(0.2995 - 0.5 * 0.1)) < 1e-5);  // 0.1 s / 1 ms times the rounding
   const std::optional<double> leaving = l.update(0.31, true);
   BOOST_TEST(std::abs(*leaving - limits.allowed(0.31)) < rounding);
-  BOOST_TEST(l.limiter.rows()->size() > 0);
   l.update(1.5, true);
   BOOST_TEST(l.command.distance == test::infinity);
   BOOST_TEST(std::abs(l.command.speed_limit - limits.far_speed) < rounding);
 }
 
-BOOST_AUTO_TEST_CASE(the_arm_has_rows_of_its_own_where_it_is_apart_and_the_words_name_what_is_slowed) {
+BOOST_AUTO_TEST_CASE(reference_and_arm_have_the_same_limit_and_the_words_name_what_is_slowed) {
   Limiting l;
   l.update(0.3, false);
-  BOOST_TEST(l.limiter.rows_of_arm()->size() == 0);
-  l.update(0.3, true, true);
-  BOOST_TEST(l.limiter.rows_of_arm()->size() == l.limiter.rows()->size());
+  l.update(0.299, true);
+  const SpeedLimitNow &reference = l.limiter.at_reference(), &arm = l.limiter.at_arm();
+  BOOST_TEST((reference.state == &l.resting));
+  BOOST_TEST((arm.state == &l.moving));
+  BOOST_TEST(reference.limit == l.command.speed_limit);
+  BOOST_TEST(arm.limit == reference.limit);
+  const double next = l.model.settings.speed_limits->allowed(0.298);  // it closes by 1 mm in a period
+  BOOST_TEST(std::abs(reference.next_limit - next) < 1e-7);           // in single precision, as above
+  BOOST_TEST(arm.next_limit == reference.next_limit);
   TorqueSolution solution(2);
   const Obstacles named = test::ball({0.5, 0.0, 0.75}, 0.1).named({"person"}, {1});
   BOOST_TEST(l.limiter.explain(l.command, solution, named) == "");

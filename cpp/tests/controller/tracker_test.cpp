@@ -12,13 +12,14 @@ using Output = ControllerSettings::Output;
 namespace {
 
 constexpr double tracked = 1e-9;  // accuracy of what the program solves exactly
+const SpeedLimitNow any_speed;    // no speed limit
 
 /// The stage with an arm of two joints: 10 rad/s² and 1000 rad/s³ less 2 %.
 struct Tracking {
   explicit Tracking(Output output, double effort_rate = test::infinity)
       : model(arm(effort_rate), test::straight_settings(output)),
         dynamics(model.dynamics, model.arm.robot(), model.settings, model.torque),
-        tracker(model.arm.robot(), model.joints, model.settings, model.torque, 0) {
+        tracker(model.arm.robot(), model.joints, model.settings, model.torque) {
     dynamics.update(test::state_at(model.arm.robot(), q), {});
   }
   static Arm arm(double effort_rate) {
@@ -29,7 +30,7 @@ struct Tracking {
   }
   TorqueStatus track(const Reference& reference, TorqueStatus decided = TorqueStatus::ok) {
     const double error = (reference.q - q).cwiseAbs().maxCoeff();
-    return tracker.track(reference, {q, v, seen, dynamics, last, nullptr}, error, decided);
+    return tracker.track(reference, {q, v, seen, dynamics, last, any_speed}, error, decided);
   }
 
   const ControllerModel model;
@@ -108,18 +109,18 @@ BOOST_AUTO_TEST_CASE(an_impedance_is_a_spring_of_torque_for_arms_that_are_moved_
   settings.tracking.stiffness = 0.5;
   const ControllerModel model = test::stage_model(2, settings);
   ArmDynamics dynamics(model.dynamics, model.arm.robot(), model.settings, true);
-  Tracker tracker(model.arm.robot(), model.joints, model.settings, true, 0);
+  Tracker tracker(model.arm.robot(), model.joints, model.settings, true);
   const Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), rest = Eigen::Vector2d::Zero();
   dynamics.update(test::state_at(model.arm.robot(), q), {});
   const Eigen::VectorXd error = Eigen::Vector2d(0.001, -0.002);
   const Reference reference = test::reference_at(q + error, rest);
   const Clearances seen(2, model.system->num_embedding_coordinates());
   const LastOutput last(2);
-  static_cast<void>(tracker.track(reference, {q, rest, seen, dynamics, last, nullptr}, 0.002, TorqueStatus::ok));
+  static_cast<void>(tracker.track(reference, {q, rest, seen, dynamics, last, any_speed}, 0.002, TorqueStatus::ok));
   // At rest K e + h is sent, K half of the effort limits per rad. The price of torque takes 1e-8 rad/s² of tracking at 1 kg m².
   const Eigen::VectorXd sent = 0.5 * model.arm.robot().limits().effort.cwiseProduct(error) + dynamics.bias();
   BOOST_TEST((tracker.solution().torque - sent).norm() < 1e-6);
   ControllerSettings position = test::straight_settings(Output::position);
   position.tracking.stiffness = 0.5;
-  BOOST_CHECK_THROW(Tracker(model.arm.robot(), model.joints, position, false, 0), std::invalid_argument);
+  BOOST_CHECK_THROW(Tracker(model.arm.robot(), model.joints, position, false), std::invalid_argument);
 }
