@@ -46,12 +46,12 @@ void optional_part(Class& c, const char* name, const char* type, std::optional<V
 
 void bind_settings_tree(nb::module_& m) {
   using S = ControllerSettings;
-  bind_settings<BarrierSettings>(m, "BarrierSettings", "The spring that pulls to the goal, and the barriers that bend its way.");
+  bind_settings<BarrierSettings>(m, "BarrierSettings", "The spring to the goal, and the barriers that bend its acceleration.");
   bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
   bind_settings<TrackingSettings>(
       m, "TrackingSettings",
-      "How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), with what the disturbance\n"
-      "observer found. Not for outputs of position and velocity, which the arm's own drives track.");
+      "Feedback that keeps the arm on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), plus the torque of the\n"
+      "disturbance observer. Not used with output position or velocity, which the arm's own drives track.");
   bind_settings<SpeedLimitSettings>(
       m, "SpeedLimitSettings",
       "Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between\n"
@@ -62,7 +62,7 @@ void bind_settings_tree(nb::module_& m) {
       {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
       .def_rw("search", &OnlinePlannerSettings::search)
       .def_rw("route", &OnlinePlannerSettings::route);
-  bind_settings<LookAheadSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
+  bind_settings<LookAheadSettings>(m, "LookAheadSettings", "Prediction and avoidance of moving obstacles, see Controller.");
   bind_settings<LocalMinimumSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
 
   nb::enum_<S::Output>(m, "Output",
@@ -118,7 +118,7 @@ void bind_settings_tree(nb::module_& m) {
         return rows;
       },
       nb::sig("def controller_settings_fields() -> list[dict[str, float | str]]"),
-      "Every setting of the tree: name (dotted), unit, default, least and most allowed, what it trades, and whether the part\n"
+      "Every setting of the tree: name (dotted), unit, default, least and most allowed, what it is and trades, and whether the part\n"
       "that its name begins with is optional, so that None leaves it out.");
 }
 

@@ -44,10 +44,12 @@ template <>
 const std::vector<Field<LocalMinimumSettings>>& fields() {
   using S = LocalMinimumSettings;
   static const std::vector<Field<S>> all{
-      {"patience", &S::patience, "s", 0.05, 60.0, "without progress until a sub-goal is taken"},
-      {"fraction", &S::fraction, "-", 1e-4, 0.99, "progress is a squared distance to the goal that falls by this share"},
-      {"leg", &S::leg, "s", 0.1, 60.0, "longest way to the first sub-goal; n times that to the n-th"},
-      {"spread", &S::spread, "rad", 0.01, 20.0, "how far each joint of the first sub-goal may be; n times that of the n-th"},
+      {"patience", &S::patience, "s", 0.05, 60.0, "time without progress after which the arm goes to a sub-goal"},
+      {"fraction", &S::fraction, "-", 1e-4, 0.99,
+       "share by which the squared distance to the goal must fall to count as progress"},
+      {"leg", &S::leg, "s", 0.1, 60.0, "longest duration of the motion to the first sub-goal; n times as long for the n-th"},
+      {"spread", &S::spread, "rad", 0.01, 20.0,
+       "largest distance of each joint of the first sub-goal from the arm; n times as far for the n-th"},
   };
   return all;
 }

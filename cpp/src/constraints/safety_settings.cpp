@@ -7,11 +7,15 @@ const std::vector<Field<SafetySettings>>& fields() {
   using S = SafetySettings;
   static const std::vector<Field<S>> all{
       {"margin", &S::margin, "m", 0.0, 0.5,
-       "clearance that every command keeps: covers tracking error, delay and noise of points"},
-      {"rate", &S::rate, "1/s", 0.5, 200.0, "how quickly a clearance may close on its margin: larger comes close quicker"},
-      {"braking_fraction", &S::braking_fraction, "-", 0.05, 1.0, "share of the hardest deceleration that is counted on"},
-      {"correction", &S::correction, "-", 0.01, 1.0, "share of an excess of closing speed that one period takes away"},
-      {"max_rows", &S::max_rows, "-", 1.0, 256.0, "clearances that bound one command: the most critical ones"},
+       "clearance that every command keeps: larger allows for more tracking error, delay and noise"},
+      {"rate", &S::rate, "1/s", 0.5, 200.0,
+       "largest closing speed per distance left to the margin: larger approaches faster, but reacts more to noise"},
+      {"braking_fraction", &S::braking_fraction, "-", 0.05, 1.0,
+       "share of the largest possible deceleration that braking relies on: larger brakes later"},
+      {"correction", &S::correction, "-", 0.01, 1.0,
+       "share of an excessive closing speed that is removed in one period: larger reacts harder"},
+      {"max_rows", &S::max_rows, "-", 1.0, 256.0,
+       "largest number of clearances that constrain one command: the most critical ones"},
   };
   return all;
 }

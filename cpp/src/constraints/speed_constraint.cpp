@@ -30,11 +30,13 @@ const std::vector<Field<SpeedLimitSettings>>& fields() {
   using S = SpeedLimitSettings;
   static const std::vector<Field<S>> all{
       {"near_speed", &S::near_speed, "m/s", 0.02, 10.0,
-       "that no frame of the arm exceeds at near_distance from an obstacle, and nearer"},
-      {"near_distance", &S::near_distance, "m", 0.0, 10.0, "to obstacles, up to which near_speed is the limit"},
-      {"far_speed", &S::far_speed, "m/s", 0.02, 10.0, "that no frame of the arm exceeds anywhere"},
+       "largest speed of any frame of the arm at near_distance from an obstacle or closer"},
+      {"near_distance", &S::near_distance, "m", 0.0, 10.0, "distance to obstacles up to which near_speed is the limit"},
+      {"far_speed", &S::far_speed, "m/s", 0.02, 10.0,
+       "largest speed of any frame of the arm at far_distance from obstacles or farther"},
       {"far_distance", &S::far_distance, "m", 0.01, 10.0,
-       "to obstacles, from which far_speed is the limit: the nearer to near_distance, the harder the arm brakes between"},
+       "distance to obstacles from which far_speed is the limit; between near_distance and far_distance the limit rises "
+       "with distance: the closer the two, the harder the arm has to brake"},
   };
   return all;
 }

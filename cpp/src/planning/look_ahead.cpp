@@ -59,14 +59,20 @@ template <>
 const std::vector<Field<LookAheadSettings>>& fields() {
   using S = LookAheadSettings;
   static const std::vector<Field<S>> all{
-      {"horizon", &S::horizon, "s", 0.1, 30.0, "how far is looked ahead: longer sees what is fast, and takes more time"},
-      {"period", &S::period, "s", 0.0005, 0.2, "of the steps of predicted motions: longer is quicker and coarser"},
-      {"delay", &S::delay, "s", 0.005, 5.0, "from one look to the next, from when on what it found is followed"},
-      {"clearance", &S::clearance, "m", -0.1, 0.5, "that a predicted motion has to keep from obstacles"},
-      {"tries", &S::tries, "-", 1.0, 1e5, "trajectories that are drawn in one look"},
+      {"horizon", &S::horizon, "s", 0.1, 30.0,
+       "length of the prediction: longer sees fast obstacles earlier, but takes more processor time"},
+      {"period", &S::period, "s", 0.0005, 0.2, "time step of predicted motions: longer is faster to compute and coarser"},
+      {"delay", &S::delay, "s", 0.005, 5.0,
+       "time from one prediction to the next, and from its start until its result is used"},
+      {"clearance", &S::clearance, "m", -0.1, 0.5, "least clearance that a predicted motion must keep from obstacles"},
+      {"tries", &S::tries, "-", 1.0, 1e5,
+       "number of avoidance trajectories that one prediction tries: more find a way out more often, but take more "
+       "processor time"},
       {"slow_after", &S::slow_after, "-", 2.0, 1e3,
-       "age of a look, in delays, from which the arm is slowed beside what moves: smaller is safer where processor time is short"},
-      {"rest_after", &S::rest_after, "-", 2.0, 1e4, "age of a look, in delays, at which the arm rests beside what moves"},
+       "age of the newest prediction above which the arm slows down near moving obstacles, as a multiple of delay: "
+       "smaller is safer where processor time is short"},
+      {"rest_after", &S::rest_after, "-", 2.0, 1e4,
+       "age of the newest prediction at which the arm stops near moving obstacles, as a multiple of delay"},
   };
   return all;
 }

@@ -8,9 +8,9 @@ template <>
 const std::vector<Field<OnlinePlannerSettings>>& fields() {
   using S = OnlinePlannerSettings;
   static const std::vector<Field<S>> all{
-      {"period", &S::period, "s", 0.001, 10.0, "between two looks of the planner at the scene: shorter reacts earlier"},
-      {"patience", &S::patience, "s", 0.05, 60.0, "without progress until another path is looked for"},
-      {"retry", &S::retry, "s", 0.05, 600.0, "until a failed search is repeated in the same scene"},
+      {"period", &S::period, "s", 0.001, 10.0, "time between two checks of the path: shorter reacts earlier"},
+      {"patience", &S::patience, "s", 0.05, 60.0, "time without progress after which another path is searched"},
+      {"retry", &S::retry, "s", 0.05, 600.0, "time after which a failed search is repeated in the same scene"},
   };
   return all;
 }

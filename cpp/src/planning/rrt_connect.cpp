@@ -41,18 +41,24 @@ template <>
 const std::vector<Field<PlannerSettings>>& fields() {
   using S = PlannerSettings;
   static const std::vector<Field<S>> all{
-      {"margin", &S::margin, "m", 0.001, 0.5, "clearance of a wide way, which is preferred"},
-      {"floor", &S::floor, "m", 1e-4, 0.5, "clearance that every way keeps: smaller finds narrower ways"},
-      {"allowance", &S::allowance, "m", 0.0, 0.2, "how deep an ellipsoid may be in something at start or goal"},
-      {"pair_allowance", &S::pair_allowance, "m", 0.0, 0.2, "the same of two links below their contact"},
-      {"slack", &S::slack, "m", 1e-5, 0.1, "what an edge may come nearer than its margin: larger is quicker"},
-      {"fade", &S::fade, "m", 0.01, 10.0, "way on which what an end may come nearer fades"},
-      {"range", &S::range, "rad", 0.01, 10.0, "longest edge of the search trees"},
-      {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "of both trees: the budget of a search"},
-      {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "of a search: its budget"},
-      {"max_checks", &S::max_checks, "-", 1.0, 2e9, "of clearances in a plan: its budget of work, some 2 s"},
-      {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "of a search; motions then do not repeat"},
-      {"shortcuts", &S::shortcuts, "-", 0.0, 1e6, "attempts to shorten a path: more are shorter and later"},
+      {"margin", &S::margin, "m", 0.001, 0.5,
+       "preferred clearance of paths: larger stays farther from obstacles, on longer paths"},
+      {"floor", &S::floor, "m", 1e-4, 0.5, "least clearance of every path: smaller passes narrower gaps"},
+      {"allowance", &S::allowance, "m", 0.0, 0.2,
+       "largest depth of a covering ellipsoid in an obstacle that is accepted at start and goal"},
+      {"pair_allowance", &S::pair_allowance, "m", 0.0, 0.2,
+       "largest depth of two links of the arm in each other that is accepted at start and goal"},
+      {"slack", &S::slack, "m", 1e-5, 0.1,
+       "distance by which an edge may undercut its margin (a quarter of the margin if that is more): larger checks faster"},
+      {"fade", &S::fade, "m", 0.01, 10.0,
+       "distance from start or goal over which their smaller margins return to the full one"},
+      {"range", &S::range, "rad", 0.01, 10.0, "length of the longest edge in the search trees"},
+      {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "largest number of nodes in both trees: the budget of one search"},
+      {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "largest number of iterations of one search: its budget"},
+      {"max_checks", &S::max_checks, "-", 1.0, 2e9,
+       "largest number of clearance checks in one plan: its budget, some 2 s of work"},
+      {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "time limit of one search; with a limit motions do not repeat"},
+      {"shortcuts", &S::shortcuts, "-", 0.0, 1e6, "number of attempts to shorten a path: more give shorter paths, later"},
   };
   return all;
 }

@@ -94,9 +94,10 @@ template <>
 const std::vector<Field<TimedPathSettings>>& fields() {
   using S = TimedPathSettings;
   static const std::vector<Field<S>> all{
-      {"wide", &S::wide, "m", 0.001, 0.1, "clearance below which a place is narrow: barriers leave room there"},
+      {"wide", &S::wide, "m", 0.001, 0.1,
+       "clearance below which a place on the path counts as narrow: activation distances are shorter there"},
       {"lead", &S::lead, "rad", 0.01, 3.0,
-       "distance at which the reference waits for the arm: larger is faster and cuts corners"},
+       "distance at which the reference waits for the arm: larger is faster, but cuts corners"},
   };
   return all;
 }

@@ -27,8 +27,8 @@ struct PlannerSettings {
   double range = 1.0;
   int max_nodes = 10000;  ///< Largest number of nodes of both trees.
   int max_iterations = 40000;
-  /// The work of a whole plan, some 2 s on any machine: clearances of single items; a thousand nodes looked through count
-  /// as one.
+  /// Largest number of clearance checks in one plan, some 2 s of work: one item counts as one, and so do a thousand nodes that
+  /// are visited.
   int max_checks = 2000000;
   double max_seconds = std::numeric_limits<double>::infinity();
   int shortcuts = 100;  ///< Attempts to shorten a path.
