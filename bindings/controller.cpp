@@ -123,76 +123,75 @@ void bind_settings_tree(nb::module_& m) {
 }
 
 void bind_command(nb::module_& m) {
-  nb::enum_<TrajectoryBehaviour>(m, "TrajectoryBehaviour", "What a Controller does with a trajectory where something is in the way.")
-      .value("keep_path", TrajectoryBehaviour::keep_path, "Stay on the path: slow down and wait before what blocks it, go on when it is free.")
-      .value("steer", TrajectoryBehaviour::steer, "Go around, and rejoin.");
-  nb::enum_<TwistFreedom>(m, "TwistFreedom", "Which part of a twist is not asked for.")
-      .value("none", TwistFreedom::none, "Translation and rotation are both asked for.")
-      .value("rotation", TwistFreedom::rotation, "Only the velocity of the frame's origin is: the frame may turn as it likes.");
+  nb::enum_<TrajectoryBehaviour>(m, "TrajectoryBehaviour", "What a Controller does if an obstacle blocks its trajectory.")
+      .value("keep_path", TrajectoryBehaviour::keep_path, "Stay on the path: slow down, wait in front of the obstacle, continue when the path is free.")
+      .value("steer", TrajectoryBehaviour::steer, "Leave the path to get around the obstacle, then return to it.");
+  nb::enum_<TwistFreedom>(m, "TwistFreedom", "Which part of a twist is left free.")
+      .value("none", TwistFreedom::none, "Translation and rotation are both commanded.")
+      .value("rotation", TwistFreedom::rotation, "Only the velocity of the frame's origin is commanded; its rotation is free.");
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
-      .value("ok", SafetyStatus::ok, "The motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for.")
-      .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
-      .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
-      .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
-      .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position agrees with no motion: the arm comes to rest.")
-      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or were never set although it is: the arm stops.")
-      .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
-      .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
-  nb::enum_<Activity>(m, "Activity", "What a controller is about.")
-      .value("no_goal", Activity::no_goal, "None was given, or no velocity for a while: the arm comes to rest, and evades.")
-      .value("moving", Activity::moving, "On the way to its goal, or as it is told.")
-      .value("waiting", Activity::waiting, "Until a posture is found, or a trajectory that it keeps to is free.")
+      .value("ok", SafetyStatus::ok, "The motion is as requested; a velocity or twist is kept within 5 %.")
+      .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance changes it.")
+      .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, velocity, acceleration or Cartesian speed gave way to clearances, position or torque limits.")
+      .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin or position limit can be kept; nothing is touched.")
+      .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its measured position: it comes to rest.")
+      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.")
+      .value("stopping", SafetyStatus::stopping, "The input is unusable or the quadratic program was not solved: a damped stop.")
+      .value("clearance_lost", SafetyStatus::clearance_lost, "A covering ellipsoid of the arm reaches into an obstacle, a plane or another link.");
+  nb::enum_<Activity>(m, "Activity", "What a controller is doing.")
+      .value("no_goal", Activity::no_goal, "No goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles.")
+      .value("moving", Activity::moving, "On the way to its goal, or following a velocity, twist or trajectory.")
+      .value("waiting", Activity::waiting, "Waiting until a posture is found, or until its trajectory is free.")
       .value("arrived", Activity::arrived, "The goal is reached.")
-      .value("blocked", Activity::blocked, "No path leads to the goal, for 0.2 s at least, see Controller.explain; the arm goes as near as it can.")
+      .value("blocked", Activity::blocked, "No path leads to the goal, for at least 0.2 s, see Controller.explain; the arm goes as near as it can.")
       .value("stale", Activity::stale, "As SafetyStatus.stale: the arm stops.");
 
-  nb::class_<Command>(m, "Command", "What one step of a Controller gives; arrays are copies.")
+  nb::class_<Command>(m, "Command", "The result of one step of a Controller; arrays are copies.")
       .def_ro("status", &Command::status, "How safe the command is.")
       .def_ro("activity", &Command::activity, "What the controller does.")
       .def_prop_ro("torque", [](const Command& c) { return to_numpy(c.torque); },
-                   "(nv,) [Nm | N], gravity included; zero where the output is not torque.")
+                   "(nv,) torque [Nm | N], gravity included; zero without torque output.")
       .def_prop_ro("torque_without_gravity", [](const Command& c) { return to_numpy(c.torque_without_gravity); },
-                   "(nv,) the same for arms that hold themselves, such as Franka's; nan where the arm has no inertias.")
+                   "(nv,) torque without gravity [Nm | N], for arms that compensate gravity themselves; nan if the arm has no inertias.")
       .def_prop_ro("acceleration", [](const Command& c) { return to_numpy(c.acceleration); },
-                   "(nv,) of the arm: the reference's with feedback [rad/s^2 | m/s^2].")
+                   "(nv,) acceleration of the arm: that of the reference plus feedback [rad/s^2 | m/s^2].")
       .def_prop_ro("wanted", [](const Command& c) { return to_numpy(c.wanted); },
-                   "(nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].")
+                   "(nv,) desired acceleration: after barriers, before any limit [rad/s^2 | m/s^2].")
       .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); },
-                   "(nv,) of the reference after this period [rad/s | m/s].")
+                   "(nv,) velocity of the reference after this period [rad/s | m/s].")
       .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); },
-                   "(nv,) of the reference after this period [rad | m]; nan until a state was known.")
+                   "(nv,) position of the reference after this period [rad | m]; nan until a state was known.")
       .def_prop_ro("disturbance", [](const Command& c) { return to_numpy(c.disturbance); },
-                   "(nv,) force that the observer makes up for, of torque outputs [Nm | N].")
+                   "(nv,) disturbance that the observer compensates, with torque output [Nm | N].")
       .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
-                   "(nv,) inertia that it found and the model lacks [kg m^2 | kg].")
+                   "(nv,) estimated rotor inertia that the model lacks [kg m^2 | kg].")
       .def_prop_ro("input_change", [](const Command& c) { return to_numpy(c.input_change); },
-                   "(nv,) what is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the\n"
-                   "reference after this period, less the velocity asked for. Of a twist V: J^+ (J v - V), damped where it is\n"
-                   "singular, so that what the frame does not feel does not count. Of a trajectory: its velocity at the clock, at\n"
-                   "full speed. Zero without one of these.")
-      .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
-      .def_ro("deviation", &Command::deviation, "Distance of the reference from the straight lines between a trajectory's samples, in the farthest joint [rad | m]: the\n"
-              "nearest of the lines within 0.05 s of where the trajectory's clock is. On the way to a first sample after zero: from\n"
-              "that way. How late it is: `delay`.")
-      .def_ro("delay", &Command::delay, "How far the trajectory's clock is behind [s].")
-      .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
-      .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
-      .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")
-      .def_ro("bound_by", &Command::bound_by, "The coordinate whose clearance bends the motion most; -1: none.")
+                   "(nv,) difference between the velocity of the reference after this period and the requested one [rad/s | m/s]. For a\n"
+                   "twist V: J^+ (J v - V), damped near singularities; motion in the null space of J does not count. For a\n"
+                   "trajectory the requested velocity is that at its clock, at full speed. Zero without one of these.")
+      .def_ro("tracking_error", &Command::tracking_error, "Largest joint error between arm and reference [rad | m].")
+      .def_ro("deviation", &Command::deviation, "Largest joint distance of the reference from the straight lines between a trajectory's samples [rad | m]; lines within\n"
+              "0.05 s of the trajectory's clock count. Before the first sample: distance from the approach to it. See `delay` for\n"
+              "how late it is.")
+      .def_ro("delay", &Command::delay, "Time by which the trajectory's clock is late [s].")
+      .def_ro("clearance", &Command::clearance, "Least clearance of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
+      .def_ro("coordinate", &Command::coordinate, "Index in Controller.labels of the pair with the least clearance; -1: nothing is near.")
+      .def_ro("point", &Command::point, "Index of the obstacle point of that pair; -1: none.")
+      .def_ro("bound_by", &Command::bound_by, "Index in Controller.labels of the clearance that changes the motion most; -1: none.")
       .def_ro("distance", &Command::distance,
-              "To the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.")
-      .def_ro("speed", &Command::speed, "Of the arm's fastest frame [m/s]; nan: unknown.")
-      .def_ro("speed_limit", &Command::speed_limit, "For every frame [m/s]; inf: none; nan: unknown.")
-      .def_ro("limits", &Command::limits, "(nv) the limits in the way of each joint.")
-      .def_ro("avoiding", &Command::avoiding, "Follows a trajectory out of the way of what moves.")
-      .def_ro("on_path", &Command::on_path, "Follows a path of the planner.")
+              "Distance to the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.")
+      .def_ro("speed", &Command::speed, "Speed of the arm's fastest frame [m/s]; nan: unknown.")
+      .def_ro("speed_limit", &Command::speed_limit, "Speed limit of every frame [m/s]; inf: none; nan: unknown.")
+      .def_ro("limits", &Command::limits, "(nv) limits that restrict each joint.")
+      .def_ro("avoiding", &Command::avoiding, "Whether the arm follows an avoidance trajectory, out of the way of a moving obstacle.")
+      .def_ro("on_path", &Command::on_path, "Whether the arm follows a path of the planner.")
       .def_prop_ro("look_ahead_age", [](const Command& c) { return c.background.look_ahead_age; },
-              "Time since the state from which the newest look-ahead that is followed was computed [s]: it grows where threads get too\n"
-              "little processor time, or steps come faster than real time. 0: the part is off, or runs inside `step`.")
-      .def_prop_ro("planner_age", [](const Command& c) { return c.background.planner_age; }, "The same of the planner's newest look [s]; 0 also where there is nothing to plan.")
+              "Age of the newest look-ahead: time since the state that it started from [s]. It grows if threads get too little processor\n"
+              "time, or if steps come faster than real time. 0: look-ahead is off, or runs inside `step`.")
+      .def_prop_ro("planner_age", [](const Command& c) { return c.background.planner_age; }, "Age of the planner's newest check, likewise [s]; 0 also if there is nothing to plan.")
       .def_prop_ro("pace", [](const Command& c) { return c.background.pace; },
-              "Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`\n"
-              "delays, then linear, 0 from `look_ahead.rest_after` delays on.")
+              "Share of its speed that the arm may use near moving obstacles, given the age of the look-ahead: 1 up to\n"
+              "`look_ahead.slow_after` delays, then linear, 0 from `look_ahead.rest_after` delays on.")
       .def("__getstate__",
            [](const Command& c) {
              nb::dict state;
@@ -269,7 +268,7 @@ void bind_controller(nb::module_& m) {
   bind_command(m);
 
   nb::class_<Controller>(m, "Controller",
-                         "State in, safe command out, once a period: planner, barriers, look-ahead and quadratic program in one.\n"
+                         "Turns the arm's state into a safe command, once a period: planner, barriers, look-ahead and quadratic program in one.\n"
                          "Goals and obstacles may be set from any thread. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
@@ -292,9 +291,9 @@ void bind_controller(nb::module_& m) {
           },
           nb::arg("goal").none(),
           nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None"),
-          "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses\n"
-          "of several frames at once, as of two arms. Joints that no pose asks to move stay where they are, and evade. Raises\n"
-          "ValueError that names the joint, its value and what is allowed; the goal before stays.")
+          "Sets the goal, from the next step on: a configuration (nv,) [rad | m] within the limits, a moving goal, a pose, or\n"
+          "poses of several frames, as of two arms. Joints that no pose needs stay where they are, and avoid obstacles. Raises\n"
+          "ValueError that names the joint, its value and what is allowed; the previous goal then stays.")
       .def(
           "set_velocity",
           [](Controller& self, nb::handle v) {
@@ -302,9 +301,10 @@ void bind_controller(nb::module_& m) {
             warn_of_order(self);
           },
           nb::arg("v").none(), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
-          "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. A joint stops at its\n"
-          "position limit while the others go on. Obstacles steer the arm around them and stop it. After `inputs.timeout` without\n"
-          "another order the arm stops. Raises ValueError that names the joint and what is allowed; the order before stays.")
+          "Commands joint velocities (nv,) [rad/s | m/s]; needs no goal. One factor scales them down to the limits. A joint stops at\n"
+          "its position limit while the others continue. The arm slides along obstacles or stops at them. After `inputs.timeout`\n"
+          "without a new request the arm stops. Raises ValueError that names the joint and what is allowed; the previous request\n"
+          "then stays.")
       .def(
           "set_twist",
           [](Controller& self, nb::handle frame, nb::handle twist, bool local, nb::handle free) {
@@ -315,12 +315,12 @@ void bind_controller(nb::module_& m) {
           nb::arg("frame").none(), nb::arg("twist").none(), nb::arg("local") = false, nb::arg("free").none() = "none",
           nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False, "
                   "free: TwistFreedom | str = 'none') -> None"),
-          "The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of\n"
-          "the world or, `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the\n"
-          "largest s in [0, 1] that joint limits and singular configurations leave. With free=\"rotation\" the rotation is not\n"
-          "asked for, and its three numbers are not read: for arms of less than six joints. Along obstacles the arm slides;\n"
-          "`command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the frames that there are,\n"
-          "or the names of what can be left free.")
+          "Commands the twist (6,) of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in axes of the world or,\n"
+          "with `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the largest s\n"
+          "in [0, 1] that joint limits and singular configurations allow. With free=\"rotation\" the last three numbers are\n"
+          "ignored and the frame may turn: for arms with fewer than six joints. Along obstacles the arm slides;\n"
+          "`command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the known frames, or the\n"
+          "values of `free`.")
       .def(
           "set_trajectory",
           [](Controller& self, nb::handle q, nb::handle times, nb::handle behaviour) {
@@ -332,19 +332,18 @@ void bind_controller(nb::module_& m) {
           nb::arg("q").none(), nb::arg("times").none(), nb::arg("behaviour").none() = "keep_path",
           nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
                   "behaviour: TrajectoryBehaviour | str = 'keep_path') -> None"),
-          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing, but for a\n"
-          "sample that is there twice. Cubics between them keep\n"
-          "monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after\n"
-          "zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that\n"
-          "limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.\n"
-          "Joints without limits take the short way from sample to sample, at most half a turn. `keep_path` slows\n"
-          "down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`\n"
-          "say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.")
-      .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
+          "Follows joint positions q (K, nv) [rad | m] at times (K,) [s] after the next step. Times must increase; a sample may be\n"
+          "there twice. Cubics between samples keep monotone samples monotone and dwells still, within 0.01 rad (2 mm) of the\n"
+          "straight lines. The arm has until the first time, at most 3600 s, to reach the first sample, which may differ from its\n"
+          "present state. If time stamps bunch up so that limits forbid them, they move by up to 0.2 s; if that is not enough, the\n"
+          "trajectory's clock slows down. Joints without limits take the short way between samples, at most half a turn.\n"
+          "`keep_path` slows down and waits in front of an obstacle, `steer` goes around it and returns. `command.deviation` and\n"
+          "`command.delay` say how far off and how late the arm is. Raises ValueError that names sample, joint, value and what is allowed.")
+      .def("clear_goal", &Controller::clear_goal, "Removes the goal: the arm comes to rest where it is, and still avoids moving obstacles.")
       .def("restart", &Controller::restart,
-           "The next step begins where the arm is, as a first one does: call it where something else has moved the arm. The goal\n"
-           "stays. Without it the same happens once five measured positions in a row agree with each other and not with the\n"
-           "command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
+           "Restarts the reference at the measured state of the next step: call it after something else has moved the arm. The goal\n"
+           "stays. Without this call the reference restarts once five measured positions in a row agree with each other but not\n"
+           "with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
       .def(
           "set_obstacles", [](Controller& self, nb::handle obstacles) {
             self.set_obstacles(as_obstacles(obstacles));
@@ -355,8 +354,8 @@ void bind_controller(nb::module_& m) {
           nb::arg("obstacles").none(),
           nb::sig("def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | "
                   "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
-          "From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which\n"
-          "covers shapes by balls without gaps. They move on by their velocities until they are set again.")
+          "Replaces all obstacles, from the next step on: points, a shape, or a list of both. Balls cover each shape without gaps,\n"
+          "see `sidestep.obstacles.obstacles_from_shapes`. Obstacles move on by their velocities until the next call.")
       .def(
           "set_arm",
           [](Controller& self, nb::handle other) {
@@ -365,8 +364,8 @@ void bind_controller(nb::module_& m) {
             self.set_arm(arm);
           },
           nb::arg("arm").none(), nb::sig("def set_arm(self, arm: Arm) -> None"),
-          "Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later: prepared beside\n"
-          "the loop in some tenths of a second, taken over by the next step. Objects stay attached; goals are planned for anew.\n"
+          "Replaces body, inertias and pairs, for example by a finer cover; joints and limits must be the same. Takes some tenths of\n"
+          "a second beside the loop; the next step uses the new body. Objects stay attached; the planner plans again.\n"
           "Raises ValueError that says what differs.")
       .def(
           "attach",
@@ -391,12 +390,12 @@ void bind_controller(nb::module_& m) {
           nb::arg("object").none(), nb::arg("geometry") = nb::none(), nb::arg("options"),
           nb::sig("def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, "
                   "**options: typing.Any) -> None"),
-          "An object that a link holds from the next step on: attach(\"cup\", Cylinder(0.04, 0.1), link=\"fr3_hand\", pose=X,\n"
+          "Attaches an object to a link, from the next step on: attach(\"cup\", Cylinder(0.04, 0.1), link=\"fr3_hand\", pose=X,\n"
           "mass=0.3, may_touch=[\"fr3_leftfinger\", \"fr3_rightfinger\"]), with the options of `sidestep.arm.attachment`; a\n"
-          "shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and\n"
-          "its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=[\"table\"] the same\n"
-          "holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.\n"
-          "Warns where the object is far away from the link, as with a pose in the world.")
+          "shape, or points (N, 3) in the object's frame. The object avoids obstacles and the links that other joints move, and its\n"
+          "mass counts. Links that overlap with it now may stay as close as they are. With rests_on=[\"table\"] it may also stay as\n"
+          "close to the obstacle 'table' as it is now, until it is lifted off. Takes less than a second, while steps continue.\n"
+          "Raises ValueError that names what is wrong; nothing changes then. Warns if the object is far from the link.")
       .def(
           "detach",
           [](Controller& self, nb::handle object) {
@@ -404,8 +403,8 @@ void bind_controller(nb::module_& m) {
             const nb::gil_scoped_release others;
             self.detach(name);
           },
-          nb::arg("name").none(), nb::sig("def detach(self, name: str) -> None"), "Lets an object go from the next step on. Raises ValueError that lists what is attached.")
-      .def_prop_ro("attached", &Controller::attached, "The names of the objects that are attached.")
+          nb::arg("name").none(), nb::sig("def detach(self, name: str) -> None"), "Releases an object, from the next step on. Raises ValueError that lists the attached objects.")
+      .def_prop_ro("attached", &Controller::attached, "Names of the attached objects.")
       .def_prop_ro("arm", &Controller::arm, "The arm (of the core), with what is attached.")
       .def_prop_ro("obstacles", of_last_step([](const Controller& self) { return Obstacles(self.obstacles()); }),
                    "A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.")

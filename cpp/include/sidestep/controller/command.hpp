@@ -11,25 +11,25 @@ namespace sidestep {
 /// How safe a command is, by severity. Every command may be sent; before a usable state was known its position is NaN, and nothing
 /// is to be sent to drives that take positions.
 enum class SafetyStatus {
-  ok,              ///< the motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for
+  ok,              ///< the motion is as requested; a velocity or twist is kept within 5 %
   limited,         ///< a limit of the arm or a clearance changes it
   relaxed,         ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position
                    ///< or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
-  tracking_lost,   ///< the arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position
-                   ///< agrees with no motion: the arm comes to rest
-  stale,           ///< the obstacles are older than `obstacle_timeout`, or were never set although it is: the arm stops
-  stopping,        ///< the input is unusable or the program was not solved: a damped stop
+  tracking_lost,   ///< the arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its
+                   ///< measured position: it comes to rest
+  stale,           ///< the obstacles are older than `obstacle_timeout`, or it is set and obstacles never were: the arm stops
+  stopping,        ///< the input is unusable or the quadratic program was not solved: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
 };
 
 /// What a controller is doing.
 enum class Activity {
-  no_goal,  ///< no goal, or no velocity for a while: the arm comes to rest, and avoids moving obstacles
-  moving,   ///< on the way to its goal, or at the commanded velocity
-  waiting,  ///< until a posture is found, or until its trajectory is free
+  no_goal,  ///< no goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles
+  moving,   ///< on the way to its goal, or following a velocity, twist or trajectory
+  waiting,  ///< waiting until a posture is found, or until its trajectory is free
   arrived,  ///< the goal is reached
-  blocked,  ///< no path leads to the goal, for 0.2 s at least, see `explain`; the arm goes as near as it can
+  blocked,  ///< no path leads to the goal, for at least 0.2 s, see `explain`; the arm goes as near as it can
   stale,    ///< as SafetyStatus::stale: the arm stops
 };
 
@@ -43,10 +43,10 @@ struct Command {
 
   SafetyStatus status = SafetyStatus::stopping;
   Activity activity = Activity::no_goal;
-  Eigen::VectorXd torque;                  ///< (nv) [Nm | N], gravity included; zero where the output is not torque
-  Eigen::VectorXd torque_without_gravity;  ///< (nv) for arms that compensate gravity; NaN where the arm has no inertias
-  Eigen::VectorXd wanted;                  ///< (nv) acceleration after barriers, before any limit [rad/s² | m/s²]
-  Eigen::VectorXd acceleration;            ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
+  Eigen::VectorXd torque;                  ///< (nv) [Nm | N], gravity included; zero without torque output
+  Eigen::VectorXd torque_without_gravity;  ///< (nv) for arms that compensate gravity; NaN if the arm has no inertias
+  Eigen::VectorXd wanted;                  ///< (nv) desired acceleration: after barriers, before any limit [rad/s² | m/s²]
+  Eigen::VectorXd acceleration;            ///< (nv) of the arm: that of the reference plus feedback [rad/s² | m/s²]
   Eigen::VectorXd velocity;                ///< (nv) of the reference after this period [rad/s | m/s]
   Eigen::VectorXd position;                ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
   Eigen::VectorXd disturbance;             ///< (nv) force that the observer compensates, for torque output [Nm | N]
@@ -54,33 +54,33 @@ struct Command {
   double tracking_error = 0.0;             ///< largest |q_r − q| [rad | m]
   double deviation = 0.0;                  ///< of the reference from the straight lines between a trajectory's samples, in the
                                            ///< farthest joint [rad | m], see JointTrajectory::deviation
-  double delay = 0.0;                      ///< how far the trajectory's clock is behind [s]
-  /// (nv) What is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the reference after
-  /// this period, less the velocity asked for. Of a twist V: J⁺ (J v − V), damped where it is singular, so that what the frame
-  /// does not feel does not count. Of a trajectory: its velocity at the clock, at full speed. Zero without one of these.
+  double delay = 0.0;                      ///< time by which the trajectory's clock is late [s]
+  /// (nv) Difference between the velocity of the reference after this period and the requested one [rad/s | m/s]. For a twist V:
+  /// J⁺ (J v − V), damped near singularities; motion in the null space of J does not count. For a trajectory the requested
+  /// velocity is that at its clock, at full speed. Zero without one of these.
   Eigen::VectorXd input_change;
 
-  /// least clearance of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
+  /// Least clearance of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
   /// unknown
   double clearance = std::numeric_limits<double>::infinity();
-  int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
-  int point = -1;       ///< the obstacle point, where it is one
-  int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none
-  /// distance to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings;
+  int coordinate = -1;  ///< index in Controller::labels of the pair with the least clearance; -1: nothing is near
+  int point = -1;       ///< index of the obstacle point of that pair; -1: none
+  int bound_by = -1;    ///< index in Controller::labels of the clearance that changes the motion most; -1: none
+  /// Distance to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings;
   /// NaN: the state is unknown
   double distance = std::numeric_limits<double>::infinity();
   double speed = 0.0;                                            ///< of the arm's fastest frame [m/s]; NaN: unknown
   double speed_limit = std::numeric_limits<double>::infinity();  ///< for every frame [m/s]; inf: none; NaN: unknown
-  std::vector<Limit> limits;                                     ///< (nv) the limits in the way of each joint
+  std::vector<Limit> limits;                                     ///< (nv) limits that restrict each joint
 
-  bool avoiding = false;  ///< it follows an avoidance trajectory of the look-ahead
-  bool on_path = false;   ///< it follows a path of the planner
-  /// How old results of the threads beside the loop are.
+  bool avoiding = false;  ///< whether the arm follows an avoidance trajectory
+  bool on_path = false;   ///< whether the arm follows a path of the planner
+  /// Ages of the results of the threads beside the loop.
   struct Background {
-    /// Time since the state from which the newest result that is followed was computed [s]: it grows where threads get too little
-    /// processor time, or steps come faster than real time. 0: the part is off, runs inside `step`, or has nothing to do.
+    /// Age of the newest result: time since the state that it started from [s]. It grows if threads get too little processor
+    /// time, or if steps come faster than real time. 0: the part is off, runs inside `step`, or has nothing to do.
     double look_ahead_age = 0.0, planner_age = 0.0;
-    double pace = 1.0;  ///< share of its speed that the age of the look-ahead leaves the arm, see LookAheadSettings::pace
+    double pace = 1.0;  ///< share of its speed that the arm may use near moving obstacles, see LookAheadSettings::pace
   } background;
 };
 

@@ -26,10 +26,10 @@ namespace sidestep {
 
 class Recorder;
 
-/// Which part of a twist is not asked for.
+/// Which part of a twist is left free.
 enum class TwistFreedom {
-  none,      ///< translation and rotation are both asked for
-  rotation,  ///< only the velocity of the frame's origin is: the frame may turn as it likes
+  none,      ///< translation and rotation are both commanded
+  rotation,  ///< only the velocity of the frame's origin is commanded; its rotation is free
 };
 
 /// The controller turns the arm's state into a safe command, once per period.
@@ -77,15 +77,15 @@ class Controller {
   /// A moving configuration, or the pose of a frame. A moving goal is followed without planner. The posture for a pose is
   /// searched near its `rest`, or near the arm if it has none.
   void set_goal(Goal goal);
-  // Each of these replaces the previous goal or order. They too throw std::invalid_argument, and the previous order then stays.
+  // Each of these replaces the previous goal or request. They too throw std::invalid_argument; the previous request then stays.
 
-  /// Wanted joint velocities (nv) [rad/s | m/s]; one factor scales them down to the limits. A joint stops at its position limit
-  /// while the others go on. The arm slides along obstacles or stops at them. After `inputs.timeout` without another order the arm stops.
+  /// Commanded joint velocities (nv) [rad/s | m/s]; one factor scales them down to the limits. A joint stops at its position limit
+  /// while the others continue. The arm slides along obstacles or stops at them. After `inputs.timeout` without a new request it stops.
   void set_velocity(const Eigen::VectorXd& v);
-  /// The wanted twist of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in world axes or, with `local`, in
+  /// The commanded twist of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in world axes or, with `local`, in
   /// the frame's axes; rows as in frame_jacobian. The frame moves with s times the whole twist, with the largest s in [0, 1]
-  /// that joint limits and singular configurations leave. With `free` the rotation is not asked for, and its three numbers are
-  /// not read: for arms of less than six joints. Along obstacles the arm slides; status, `explain` and Command::input_change
+  /// that joint limits and singular configurations allow. With `free` the last three numbers are ignored and the frame may
+  /// turn: for arms with fewer than six joints. Along obstacles the arm slides; status, `explain` and Command::input_change
   /// say so.
   void set_twist(const std::string& frame, const Vector6d& twist, bool local = false, TwistFreedom free = TwistFreedom::none);
   /// Joint positions q (nv × K) at times (K) [s] after the step that receives them, see JointTrajectory. If the first time is
@@ -95,11 +95,11 @@ class Controller {
 
   /// The arm comes to rest where it is, and still avoids moving obstacles.
   void clear_goal();
-  /// The next step with a usable state begins where the arm is, as a first one does: for arms that something else has moved. The
-  /// goal stays, and a trajectory goes on from where its clock is. From any thread; no allocation.
+  /// Restarts the reference at the measured state of the next usable step: for arms that something else has moved. The goal stays,
+  /// and a trajectory continues from where its clock is. From any thread; no allocation.
   ///
-  /// Without it the same happens once five measured positions in a row agree with each other and not with the reference, or at the
-  /// first one that does not after more than 0.1 s without a step, by the machine's clock. Until then the reference comes to rest,
+  /// Without this call the reference restarts once five measured positions in a row agree with each other but not with the
+  /// reference, or at the first one that disagrees after more than 0.1 s without a step, by the machine's clock. Until then the reference comes to rest,
   /// and the status is `tracking_lost`.
   void restart() noexcept { restarts_.store(true, std::memory_order_release); }
 
@@ -109,7 +109,7 @@ class Controller {
   // Each of these prepares another body while steps go on, in a few tenths of a second, and returns. The next step uses the new
   // body. The planner plans again, from where the arm is.
 
-  /// Another body, inertias and pairs for the same joints and limits, for example a finer cover. Objects stay attached. Throws
+  /// Replaces body, inertias and pairs, for example by a finer cover; joints and limits must be the same. Objects stay attached. Throws
   /// std::invalid_argument that says what differs.
   void set_arm(Arm arm);
   /// A link holds this object from now on, see sidestep::attach. At the arm's last configuration it counts as apart from all
@@ -153,7 +153,7 @@ class Controller {
   /// One sentence: what the last command does, why, and what to do about it. Only for the thread of `step`; allocates.
   std::string explain() const;
 
-  /// What is hard to believe in the order and the obstacles that were set last, such as millimetres for metres, see Plausibility;
+  /// What is hard to believe in the request and the obstacles that were set last, such as millimetres for metres, see Plausibility;
   /// they are followed all the same. From any thread; allocates.
   Questions questions() const;
 
