@@ -149,7 +149,7 @@ def test_a_goal_in_self_collision_is_said_to_be_so(goal: list[float], planner: b
     motion = ss.integrate(controller, arm.neutral, np.zeros(3), steps=6000)
     assert motion.activities[-1] == ss.Activity.blocked
     assert ss.SafetyStatus.clearance_lost not in motion.statuses
-    said = r"at the goal links 'link1' and 'link3' touch, \d+ mm deep, as far as the covering body says; "
+    said = r"at the goal links 'link1' and 'link3' touch, \d+ mm deep, according to the covering body; "
     said += "set another goal"
     assert re.search(said, controller.explain())
 

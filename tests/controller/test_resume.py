@@ -108,7 +108,7 @@ def test_drives_hold_until_five_samples_agree(arm: ss.Arm, output: str, order: s
         command = controller.step(away, rest)
         assert command.status == ss.SafetyStatus.tracking_lost
         assert controller.explain().startswith(
-            f"the arm is not where it was commanded: joint 'fr3_joint1' is {by:.2f} rad off; it stops until"
+            f"the arm is not where it was commanded: joint 'fr3_joint1' is {by:.2f} rad off; stopping until"
         )
         # At rest the command is the last one, but for what the arm lacked of its arrival [rad, rad/s].
         np.testing.assert_allclose(command.position, last.position, atol=1e-6)

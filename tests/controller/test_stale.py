@@ -37,7 +37,8 @@ def test_obstacles_that_were_never_set_are_stale_where_a_timeout_is(planar: ss.A
     assert set(motion.statuses) == {ss.SafetyStatus.stale}
     np.testing.assert_array_equal(motion.last_q, START)
     assert controller.explain() == (
-        "stopped: obstacle_timeout is set, but obstacles never were; call set_obstacles, with none where nothing is"
+        "stopped: obstacle_timeout is set, but set_obstacles was never called; "
+        "pass Obstacles.none() for a free workspace"
     )
     controller.set_obstacles(ss.Obstacles.none())
     assert controller.step(START, np.zeros(3)).status < ss.SafetyStatus.stale

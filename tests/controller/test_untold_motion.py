@@ -101,7 +101,7 @@ def test_a_ball_whose_velocity_nobody_told_touches_nothing(
         name=name,
     )
     assert least_clearance(motion, arm, start, velocity) > 0.003  # [m] that vertices alone may miss
-    assert any("although no such velocity was told" in words for words in motion.words)
+    assert any("although no such velocity was given" in words for words in motion.words)
 
 
 @pytest.mark.parametrize("what", ["set_arm", "attach"])
@@ -156,7 +156,7 @@ def test_an_arm_does_not_flee_from_a_point_that_flickers(rate: float, depth: flo
     motion = Motion(scene, 2.0, rate=rate)
     assert motion.acceleration == 0.0
     assert motion.moved == 0.0
-    assert any("it waits to see whether that lasts" in words for words in motion.words)
+    assert any("waiting until more sets of obstacles confirm it" in words for words in motion.words)
 
 
 def point_at(arm: ss.Arm, clearance: float, radius: float = 0.005) -> np.ndarray:

@@ -73,8 +73,8 @@ def test_on_a_path_to_a_pose_the_distance_is_that_of_the_frame() -> None:
     position = 1000.0 * np.linalg.norm(now[:3, 3] - pose[:3, 3])
     rotation = abs(np.arctan2(turn[1, 0], turn[0, 0]))  # of a planar arm
     assert position > 300.0
-    told = numbers(r"on the way, (\S+) mm and (\S+) rad from the goal", c.explain())
-    assert told == pytest.approx([position, rotation], abs=0.06)  # as they are rounded
+    told = numbers(r"on the way, (\S+) mm and (\S+)° from the goal", c.explain())
+    assert told == pytest.approx([position, np.rad2deg(rotation)], abs=0.6)  # as they are rounded
 
 
 def test_what_slides_is_in_millimetres() -> None:
@@ -290,6 +290,6 @@ def test_of_a_link_that_hardly_moves_it_is_not_said_that_it_goes_on():
     for _ in range(30):  # the planner has looked
         controller.step(arm.neutral, np.zeros(7))
     words = controller.explain()
-    assert "no joint but 'fr3_joint1' moves that link" in words
-    assert "take the obstacle away" in words
+    assert "only joint 'fr3_joint1' moves that link" in words
+    assert "remove the obstacle" in words
     assert "it goes on when that is free" not in words

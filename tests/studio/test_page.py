@@ -151,8 +151,8 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
 def test_all_words_can_be_read(studio: Studio, looker: Looker, monkeypatch: pytest.MonkeyPatch) -> None:
     """The longest that usually come fit where they are; longer ones push down what is below them."""
     usual = (
-        "Link 'fr3_link5' and cloud12 overlap by 12 mm, as far as the covering body says; if points lie on the arm "
-        "itself, filter the arm out of the cloud; no path was found yet; it is looked for again; fr3_link5 slides "
+        "Link 'fr3_link5' and cloud12 overlap by 12 mm, according to the covering body; if points lie on the arm "
+        "itself, filter the arm out of the cloud; no path was found yet; searching again; fr3_link5 slides "
         "along cloud12, 12 mm away.",
         "exact meshes: fr3_link5 – cloud12 -12 mm (least so far -15 mm)<br>touches: fr3_link5 - cloud12 · 123.4 s · "
         "0.95 × real time<br>status: clearance_lost, moving",

@@ -298,7 +298,7 @@ def test_an_arm_steps_out_of_the_way_of_what_comes(
             words.add(session.snapshot().words)
     looks = method != "reactive"
     assert (session.snapshot().touched == 0) == looks
-    assert ("steps out of the way of what moves" in words) == looks
+    assert ("avoiding a moving obstacle" in words) == looks
 
 
 def test_after_a_restart_it_does_not_step_aside_yet(make_session: MakeSession) -> None:

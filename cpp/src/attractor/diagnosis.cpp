@@ -2,11 +2,14 @@
 
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep {
 namespace {
+
+constexpr double few = 10.0;  // mm or degrees below which a tenth is worth saying
 
 std::string number(const char* format, double value) {
   char text[48];
@@ -40,7 +43,7 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacle
                   (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.prismatic) +
                                                     (d.clearance < 0.0 ? " beyond it" : " away")
                                               : "")};
-    case CoordinateLabel::Kind::effort: return {"joint " + label.name, "its effort limit, by what it holds of the arm"};
+    case CoordinateLabel::Kind::effort: return {"joint " + label.name, "its effort limit (gravity torque)"};
     case CoordinateLabel::Kind::potential: break;
   }
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};
@@ -65,8 +68,10 @@ std::string Diagnosis::way_left() const {
   if (!std::isnan(joint_error)) {
     return way(joint_error, "%.2f rad", prismatic);
   }
-  const std::string position = number("%.1f mm", 1000.0 * position_error);
-  return std::isnan(rotation_error) ? position : position + number(" and %.2f rad", rotation_error);
+  const auto in_digits = [](double value) { return number(value < few ? "%.1f" : "%.0f", value); };
+  const std::string position = in_digits(1000.0 * position_error) + " mm";
+  return std::isnan(rotation_error) ? position
+                                    : position + " and " + in_digits(rotation_error * 180.0 / std::numbers::pi) + "°";
 }
 
 bool Diagnosis::is_near() const noexcept {

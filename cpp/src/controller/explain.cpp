@@ -15,7 +15,7 @@ std::string explain_stop(TorqueStatus program, const MeasuredState& arm, const P
     return "braking to a stop: " + plausible.describe(arm.what_is_impossible());
   }
   if (program == TorqueStatus::fallback_solver) {
-    return "braking to a stop: the program was not solved";
+    return "braking to a stop: the quadratic program was not solved";
   }
   return std::string("braking to a stop: the ") + (fault == TorqueFault::none ? "state" : name(fault)) +
          " of this step is unusable; check its size and that it is finite";
@@ -23,7 +23,7 @@ std::string explain_stop(TorqueStatus program, const MeasuredState& arm, const P
 
 std::string explain_overlap(const Command& command, const CoordinateLabel& label, const Obstacles& obstacles) {
   return parties(label, obstacles.words_for(command.point)) + " overlap by " + millimetres(command.clearance) +
-         ", as far as the covering body says; " +
+         ", according to the covering body; " +
          (label.kind == CoordinateLabel::Kind::obstacle ? "if points lie on the arm itself, filter the arm out of the cloud; "
                                                         : "");
 }
@@ -34,13 +34,13 @@ std::string explain_activity(Activity activity, const InputsStage& inputs, const
   switch (activity) {
     case Activity::no_goal:
       return !inputs.request().has_input()
-                 ? "no goal: it holds still, and evades what comes"
+                 ? "no goal: holding position and avoiding moving obstacles"
                  : "stopped: the velocity is " +
                        age_in_words(inputs.request().age(), "inputs.timeout", settings.inputs.timeout) +
                        "; set_velocity or set_twist must be called more often";
     case Activity::stale:
       return sources.number() == 0
-                 ? "stopped: obstacle_timeout is set, but obstacles never were; call set_obstacles, with none where nothing is"
+                 ? "stopped: obstacle_timeout is set, but set_obstacles was never called; pass Obstacles.none() for a free workspace"
                  : "stopped: the obstacles are " + age_in_words(sources.age(), "obstacle_timeout", settings.obstacle_timeout) +
                        "; set_obstacles must be called more often";
     case Activity::waiting: return "waiting for a posture that reaches the pose";
@@ -107,7 +107,7 @@ std::string Controller::Impl::explain_way() const {
     return "the goal has left the position limits: it is not followed; set a new goal";
   }
   if (inputs_.request().is_any() && !inputs_.request().moves() && !goal.is_led_to_target()) {
-    return "another posture is looked for";
+    return "searching another posture";
   }
   std::string text;
   if (goal.is_led_to_target() && !goal.reaches_goal()) {
@@ -124,13 +124,13 @@ std::string Controller::Impl::explain_way() const {
     text += at_target + "; ";
   }
   if (planner_status == OnlinePlannerStatus::no_path) {
-    text += "no path was found yet; it is looked for again; ";
+    text += "no path was found yet; searching again; ";
   }
   if (look_ahead_.is_followed()) {
-    return text + "steps out of the way of what moves";
+    return text + "avoiding a moving obstacle";
   }
   if (state_.followed != nullptr && state_.followed != goal.led_goal() && state_.followed != &inputs_.destination()) {
-    text += "leaves a local minimum by a sub-goal; ";
+    text += "leaving a local minimum by a sub-goal; ";
   }
   if (inputs_.request().has_input()) {
     return text + explain_input(model, inputs_, command_, reference_.next_v,

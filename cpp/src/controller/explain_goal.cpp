@@ -35,9 +35,9 @@ std::string way_out(const Robot& robot, const Obstruction& here) {
   if (here.label.kind == CoordinateLabel::Kind::obstacle) {
     const int joint = robot.frames()[static_cast<std::size_t>(robot.frame_index(here.label.name))].joint;
     if (joint < 0 || robot.joints()[static_cast<std::size_t>(joint)].parent < 0) {
-      return joint < 0 ? "; no joint moves that link: take the obstacle away, or out of set_obstacles"
-                       : "; no joint but '" + robot.joints()[static_cast<std::size_t>(joint)].name +
-                             "' moves that link: if it does not get out so, take the obstacle away, or out of set_obstacles";
+      return joint < 0 ? "; no joint moves that link: remove the obstacle, or leave it out of set_obstacles"
+                       : "; only joint '" + robot.joints()[static_cast<std::size_t>(joint)].name +
+                             "' moves that link: if that is not enough, remove the obstacle, or leave it out of set_obstacles";
     }
   }
   return "; it goes on when that is free";
@@ -78,7 +78,7 @@ std::string explain_target(const ControllerModel& model, const RequestBoard& boa
   if (posture && posture->touches_itself &&
       endpoint_checker.obstructed(target, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
     return "no posture without self-collision was found for the pose: at the last one " + describe(obstruction) +
-           "; others are looked for";
+           "; searching others";
   }
   if (!endpoint_checker.obstructed(target, obstacles, obstruction)) {
     if (goal.planner_status() != OnlinePlannerStatus::goal_in_collision) {
@@ -87,14 +87,14 @@ std::string explain_target(const ControllerModel& model, const RequestBoard& boa
     obstruction = goal.planner()->last_plan().obstruction;
   }
   if (obstruction.label.kind == CoordinateLabel::Kind::effort) {
-    return "at the goal " + describe(obstruction) + (is_pose ? "; another posture is looked for" : "; set another goal");
+    return "at the goal " + describe(obstruction) + (is_pose ? "; searching another posture" : "; set another goal");
   }
   const bool own = obstruction.label.kind == CoordinateLabel::Kind::self;
   const bool finer = finer_covers_may_free(model.arm, model.settings.safety.margin, obstruction);
   return "at the goal " + describe(obstruction) +
          (!own      ? std::string("; it goes on when that is free") + (finer ? ", or with a finer cover of the link" : "")
-          : is_pose ? "; another posture is looked for"
-                    : std::string(", as far as the covering body says; set another goal, or allow the two to touch") +
+          : is_pose ? "; searching another posture"
+                    : std::string(", according to the covering body; set another goal, or allow the two to touch") +
                           (finer ? ", or cover them more finely" : ""));
 }
 
@@ -156,16 +156,16 @@ std::string explain_closing(const Sources& sources, const Clearances& clearances
   }
   const std::string what = sources.obstacles().words_for(clearances.nearest[nearest]);
   if (closing.is_doubted(nearest)) {
-    return what + " has just appeared inside the margin: it waits to see whether that lasts; ";
+    return what + " has just appeared inside the margin: waiting until more sets of obstacles confirm it; ";
   }
   char speed[32];
   std::snprintf(speed, sizeof speed, "%.2g", closing.speed(nearest));
-  return "gives way to " + what + ", which comes nearer at " + speed + " m/s although no such velocity was told; ";
+  return "giving way to " + what + ", which approaches at " + speed + " m/s although no such velocity was given; ";
 }
 
 std::string explain_age(double pace, double age) {
   char text[96];
-  std::snprintf(text, sizeof text, "slowed to %.0f %%: the look-ahead is %.1f s old, ", 100.0 * pace, age);
+  std::snprintf(text, sizeof text, "slowed to %.0f %%: the look-ahead is %.1f s old; ", 100.0 * pace, age);
   return text + std::string("it gets too little processor time, or steps come faster than real time; ");
 }
 

@@ -246,9 +246,9 @@ std::string MeasuredState::explain(const Eigen::VectorXd& commanded_q, double ti
     return "the arm is not where it was commanded: joint '" + robot_.coordinate_names()[static_cast<std::size_t>(joint)] +
            "' is " + error + " off; " +
            (agrees ? "check its drives, or slow the motion down; "
-                   : "it stops until the measured position agrees with the command, or five in a row with each other");
+                   : "stopping until the measured position agrees with the command, or five in a row agree with each other");
   }
-  return time < away.moved_until ? "the arm was moved by something else: it goes on from where it is; " : "";
+  return time < away.moved_until ? "the arm was moved by something else: continuing from where it is; " : "";
 }
 
 }  // namespace sidestep

@@ -170,8 +170,8 @@ std::string Plausibility::question(const Goal& goal) const {
       return {};
     }
     return "goal: the pose of frame '" + pose.frame().name + "' is " + number(away) +
-           " m from the arm's shoulder, which it is at most " + number(pose.reach()) + " m away from; " +
-           length_unit(away, reach) + " Positions are in metres";
+           " m from the arm's shoulder, and it reaches at most " + number(pose.reach()) + " m; " + length_unit(away, reach) +
+           " Positions are in metres";
   };
   const auto& pose = std::get<PoseGoal>(goal);
   std::string found = of_pose(pose);
@@ -223,7 +223,7 @@ std::string Plausibility::question_trajectory(const Eigen::MatrixXd& q, const Ei
     }
   }
   if (pace > 0.0 && pace < slowest) {
-    return "trajectory: it takes " + number(times[times.size() - 1]) + " s, at no more than " + number(pace) +
+    return "trajectory: it takes " + number(times[times.size() - 1]) + " s and uses at most " + number(pace) +
            " of the velocity limits; times in milliseconds? They are in seconds";
   }
   return {};

@@ -24,7 +24,7 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
     case CoordinateLabel::Kind::self: return "links '" + label.name + "' and '" + label.other + "'";
     case CoordinateLabel::Kind::plane: return "link '" + label.name + "' and a plane";
     case CoordinateLabel::Kind::joint_limit: return "joint '" + label.name + "' and its " + label.other + " limit";
-    case CoordinateLabel::Kind::effort: return "joint '" + label.name + "' and its effort limit, by what it holds of the arm";
+    case CoordinateLabel::Kind::effort: return "joint '" + label.name + "' and its effort limit (gravity torque)";
     case CoordinateLabel::Kind::potential: break;
   }
   return "a potential";

@@ -33,7 +33,7 @@ std::string describe(const Obstruction& obstruction) {
       return "links '" + obstruction.label.name + "' and '" + obstruction.label.other + "' touch, " + millimetres + " mm deep";
     case CoordinateLabel::Kind::plane: return "link '" + obstruction.label.name + "'" + in + "a plane";
     case CoordinateLabel::Kind::effort:
-      return "joint '" + obstruction.label.name + "' cannot hold the arm with its effort limit";
+      return "joint '" + obstruction.label.name + "' cannot hold the arm against gravity within its effort limit";
     default: return "nothing";
   }
 }

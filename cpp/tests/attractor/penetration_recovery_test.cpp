@@ -241,7 +241,7 @@ BOOST_AUTO_TEST_CASE(states_are_told_apart) {
   BOOST_TEST((system.acceleration(rest, rest, unreachable, Obstacles::none(), w) == StepStatus::goal_out_of_reach));
   d = system.diagnose(w);
   BOOST_TEST((d.state == MotionState::stuck));
-  BOOST_TEST(words(d) == "stuck 100.0 mm from the goal: nothing is in the way, so the pose is out of reach");
+  BOOST_TEST(words(d) == "stuck 100 mm from the goal: nothing is in the way, so the pose is out of reach");
 }
 
 BOOST_AUTO_TEST_CASE(no_goal_recovery_or_diagnosis_allocates) {

@@ -167,7 +167,8 @@ BOOST_AUTO_TEST_CASE(where_the_torque_cannot_hold_the_arm_it_does_not_go) {
   };
   BOOST_TEST(run(level, 6000) < allowed);
   BOOST_TEST((controller.command().activity == Activity::blocked));
-  BOOST_TEST(controller.explain().find("joint 'joint2' cannot hold the arm with its effort limit; set another goal") !=
+  BOOST_TEST(controller.explain().find(
+                 "joint 'joint2' cannot hold the arm against gravity within its effort limit; set another goal") !=
              std::string::npos);
   BOOST_TEST(q[1] > 0.5);  // as near as it can be held
 
