@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   const sidestep::Command& command = controller.command();
   auto due = std::chrono::steady_clock::now();
   for (int k = 0; k < 10000 && controller.step(q, v).activity != sidestep::Activity::arrived; ++k) {
-    v = command.velocity;  // a model that does what it is told; send command.torque to an arm
+    v = command.velocity;  // an ideal robot: it tracks the command exactly; send command.torque to an arm
     q = command.position;
     std::this_thread::sleep_until(due += std::chrono::milliseconds(1));
   }
