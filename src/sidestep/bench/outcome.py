@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from sidestep.distance.clearance import FINEST
 from sidestep.robot import Robot
 from sidestep.robot.turns import ways_to
 from sidestep.simulation.evaluation import excess_over, outside_of
+from sidestep.simulation.joint_words import pose_in_words
 
 Array = npt.NDArray[np.float64]
 
@@ -114,7 +114,7 @@ class Outcome:
             away = f"{self.error_rad:.2f} rad from the goal"
             if self.pose_error is not None:
                 distance, angle = self.pose_error
-                away = f"{1e3 * distance:.1f} mm and {math.degrees(angle):.1f}° from the pose"
+                away = f"{pose_in_words(distance, angle)} from the pose"
             found.append(f"{'under way' if self.under_way else 'stuck'}: {away} after {self.time_s:.1f} s")
         found += [f"{name} limit exceeded by {value:.3g}" for name, value in self.limits.items()]
         return found

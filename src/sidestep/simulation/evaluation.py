@@ -13,7 +13,7 @@ from sidestep._core import JointLimits
 from sidestep.distance.clearance import ExactClearance
 from sidestep.robot.tolerance import tolerances
 from sidestep.robot.turns import ways_to
-from sidestep.simulation.joint_words import in_words, largest_ways
+from sidestep.simulation.joint_words import in_words, largest_ways, pose_in_words
 from sidestep.simulation.run import Run, SimulationRun
 
 Array = npt.NDArray[np.float64]
@@ -116,7 +116,7 @@ class Evaluation:
         """How far from the goal the run ended, in words."""
         if self.pose_distance_m is None:
             return in_words(self.position_error_rad, self.position_error_m)
-        return f"{1e3 * self.pose_distance_m:.1f} mm and {self.pose_angle_rad or 0.0:.2g} rad"
+        return pose_in_words(self.pose_distance_m, self.pose_angle_rad or 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; what is not a finite number is None."""

@@ -1,6 +1,8 @@
-"""Ways of joints in words: of turning joints in rad, of sliding joints in mm."""
+"""Errors of joints and poses in words: revolute joints in rad, prismatic joints in mm, poses in mm and degrees."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +13,7 @@ Array = npt.NDArray[np.float64]
 
 
 def largest_ways(robot: Robot, ways: Array) -> tuple[float | None, float | None]:
-    """The largest |way| of turning joints [rad] and of sliding joints [m] among (nv,); None without such a joint."""
+    """The largest |way| of revolute joints [rad] and of prismatic joints [m] among (nv,); None without such a joint."""
     slides = np.array([unit == "m" for unit in robot.coordinate_units])
     sizes = np.abs(ways)
     turning, sliding = sizes[~slides], sizes[slides]
@@ -32,3 +34,10 @@ def in_words(
     if length is not None:
         words.append(f"{1000.0 * length:{millimetres}} mm")
     return " and ".join(words)
+
+
+def pose_in_words(distance: float, angle: float) -> str:
+    """An error of a pose, by distance [m] and angle [rad], such as "1228 mm and 56°"; below 10 with a tenth."""
+    numbers = 1000.0 * distance, math.degrees(angle)
+    millimetres, degrees = (f"{value:.{1 if value < 10.0 else 0}f}" for value in numbers)
+    return f"{millimetres} mm and {degrees}°"
