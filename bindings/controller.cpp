@@ -521,8 +521,8 @@ void bind_controller(nb::module_& m) {
       nb::arg("tolerance") = 0.0,
       nb::sig("def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, "
               "goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord"),
-      "Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is\n"
-      "within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises\n"
+      "Moves an ideal robot, which tracks the command exactly, by semi-implicit Euler: v += a T, q += v T. Ends when every joint\n"
+      "is within tolerance [rad], a prismatic one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises\n"
       "ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.");
 }
 

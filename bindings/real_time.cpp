@@ -13,8 +13,8 @@ void bind_real_time(nb::module_& m) {
   nb::class_<RealTimeRun>(
       m, "RealTimeRun",
       "Runs a Controller at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1\n"
-      "periods after the start, and what is late is not left out. The arm does what it is told: v += a T, q += v T. Until it\n"
-      "has ended the controller is its alone, but for goals, obstacles and what the planner knows. steps: at most 100,000,000,\n"
+      "periods after the start, and late steps are not skipped. The arm is an ideal robot: v += a T, q += v T. Until the run\n"
+      "ends the controller is reserved for it: others may only set goals and obstacles, and read what the planner knows. steps: at most 100,000,000,\n"
       "of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault,\n"
       "RuntimeError if the controller is in use.")
       .def(

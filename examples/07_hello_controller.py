@@ -1,7 +1,7 @@
 """The controller: an arm by the path of its URDF, a goal, an obstacle, a loop at 1 kHz.
 
 Run it in the folder above. A description is prepared on first use and kept; the cover of this one comes with Sidestep.
-Here a model does what it is told; an arm is sent `command.torque`.
+Here an ideal robot tracks the command exactly. To a real arm you send `command.torque`.
 """
 
 import sidestep as ss

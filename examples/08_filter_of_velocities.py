@@ -1,6 +1,6 @@
-"""A filter of velocities: whatever is told, the arm keeps off the ball, and stops when nothing is told.
+"""A filter of velocities: whatever velocity you send, the arm avoids the ball; without new ones it stops.
 
-No goal is needed. Obstacles steer the arm around them; each order counts for `inputs.timeout`, 0.25 s.
+No goal is needed. The arm slides along obstacles; each velocity is valid for `inputs.timeout`, 0.25 s.
 """
 
 import sidestep as ss

@@ -1,4 +1,4 @@
-// A filter of velocities: whatever is told, the arm keeps off the ball, and stops when nothing is told.
+// A filter of velocities: whatever velocity you send, the arm avoids the ball; without new ones it stops.
 //     sidestep prepare fr3 -o fr3.arm && build/example/08_filter_of_velocities fr3.arm
 // Exit code 0 if nothing was touched.
 #include <algorithm>

@@ -35,7 +35,7 @@ def controller_of(arm: Arm, **settings: Any) -> Controller:
 
 
 def ideal_step(controller: Controller, q: Array, v: Array) -> tuple[Array, Array]:
-    """State after a step of a robot that does what it is told."""
+    """State after a step of an ideal robot, which tracks the command exactly."""
     command = controller.step(q, v)
     if controller.settings.output.name in ("position", "velocity"):
         return command.position, command.velocity
