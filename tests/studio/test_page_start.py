@@ -109,9 +109,9 @@ def test_the_scene_says_why(studio: Studio, looker: Looker) -> None:
     goal = studio.view.loop.robot.pose(studio.view.goal.q, studio.view.loop.tip)[:3, 3]
     np.testing.assert_allclose(why.path.points[-1, 1], goal, atol=1e-3)
     looker.tab("Show")
-    looker.check("path, pull and what binds")
+    looker.check("path, attraction and what binds")
     until(lambda: not why.path.visible and not why.pull.visible, "neither")
-    looker.check("path, pull and what binds")
+    looker.check("path, attraction and what binds")
     studio.send(m.SetJointGoal(last(studio).q))
     until(lambda: "new goal" in looker.page.locator("#events").inner_text(), "the event")
 

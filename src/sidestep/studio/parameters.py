@@ -20,8 +20,8 @@ Numbers: TypeAlias = dict[str, Any]  # values by the names of parameters; as a f
 AROUND = 10.0  # times the default, and that part of it, are the ends of a slider, within the range
 SWITCH = "system.switch"  # of several forms, with numbers of their own
 FOLDERS = {  # on the page, by places in a scenario file
-    "controller.barriers": "Pull and barriers",
-    "system": "Pull to the goal",
+    "controller.barriers": "Attraction and barriers",
+    "system": "Attraction to the goal",
     SWITCH: "Switch",
     "embedding": "Curved space",
     "embedding.joint_limits": "Curved space",

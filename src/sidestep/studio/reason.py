@@ -46,7 +46,7 @@ class Reason:
     Attributes:
         path: waypoints (W, nv) from about where the arm is to its goal, straight between them; none where it follows
             no path of the planner.
-        pull: (nv,) [rad/s^2 | m/s^2] what goal or path ask for, before obstacles bend it.
+        pull: (nv,) [rad/s^2 | m/s^2] attraction by goal or path, before obstacles bend it.
         link: whose clearance bends the motion most; "": none. obstacle: to which obstacle; "": to another link or a
             joint limit. point: (3,) [m] the obstacle's point that counts, and its radius [m].
         stepping_aside: whether a trajectory out of the way of what moves is followed.

@@ -57,7 +57,7 @@ LEGEND = (
     (FURNITURE, f"obstacle larger than {200 * LARGE:.0f} cm"),
     (LIT, "link and obstacle point that bend the motion most now"),
     (PATH, "path of the tip that is planned"),
-    (PULL, "arrow: how the goal or the path pulls at the tip"),
+    (PULL, "arrow: attraction of the tip by the goal or the path"),
     (OTHER, "ghost arm of the method that is compared"),
     (GOAL, "goal: ghost arm; the gizmo at its tip has the colours of the axes"),
     (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),

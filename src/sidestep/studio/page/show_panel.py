@@ -17,7 +17,7 @@ class ShowPanel:
     def __init__(self, server: viser.ViserServer) -> None:
         gui = server.gui
         self.goal = gui.add_checkbox("goal", True)
-        self.why = gui.add_checkbox("path, pull and what binds", True)
+        self.why = gui.add_checkbox("path, attraction and what binds", True)
         self.body = gui.add_checkbox("body", False)
         self.nearest = gui.add_checkbox("nearest line", True)
         self.trail = gui.add_checkbox("trail", True)

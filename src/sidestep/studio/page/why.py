@@ -1,4 +1,4 @@
-"""Why the arm moves as it does, in the scene: its path, the pull at its tip, and the point that bends the motion."""
+"""Why the arm moves as it does, in the scene: its path, the attraction of its tip, the limiting point."""
 
 from __future__ import annotations
 

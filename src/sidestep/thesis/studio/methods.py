@@ -102,7 +102,7 @@ METHODS = (
     Method(
         "thesis",
         "thesis: distance switch",
-        "One summed density; near obstacles a switch takes the pull to the goal away, joint by joint (T6.2).",
+        "One summed density; near obstacles a switch takes the attraction to the goal away, joint by joint (T6.2).",
         (
             *_SPRING,
             switch(
@@ -128,13 +128,13 @@ METHODS = (
     Method(
         "unswitched",
         "thesis: unswitched",
-        "One summed density, pull and bending added without a switch (T2.12).",
+        "One summed density, attraction and bending added without a switch (T2.12).",
         (*_SPRING, *_DENSITY),
     ),
     Method(
         "sigmoid",
         "thesis: sigmoid switch",
-        "One summed density; where psi is high the pull to the goal fades (thesis 6.1.1).",
+        "One summed density; where psi is high the attraction to the goal fades (thesis 6.1.1).",
         (
             *_SPRING,
             _THRESHOLD,
@@ -145,7 +145,7 @@ METHODS = (
     Method(
         "binary",
         "thesis: binary switch",
-        "One summed density; where psi is above the threshold there is no pull to the goal (T5.5).",
+        "One summed density; where psi is above the threshold there is no attraction to the goal (T5.5).",
         (*_SPRING, _THRESHOLD, *_DENSITY),
     ),
     Method(
