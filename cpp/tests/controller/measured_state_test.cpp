@@ -92,7 +92,7 @@ BOOST_AUTO_TEST_CASE(five_samples_in_a_row_that_disagree_begin_the_motion_anew_a
   BOOST_TEST(m.state.agrees_with_reference());
   BOOST_TEST(m.is_at(elsewhere, rests));
   m.step(elsewhere, rests, elsewhere);
-  BOOST_TEST(m.state.explain(elsewhere, m.time) == "the arm was moved by something else: it goes on from where it is; ");
+  BOOST_TEST(m.state.explain(elsewhere, m.time) == "the arm was moved by something else: continuing from where it is; ");
   BOOST_TEST(m.state.explain(elsewhere, m.time + 1.0) == "");
 }
 
