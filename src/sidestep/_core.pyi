@@ -1202,11 +1202,11 @@ class SafetySettings:
     """
     What every command keeps of clearances, of which the margin may be less: `Clearances.margins`.
 
-        margin [m], default 0.005, allowed 0 to 0.5: clearance that every command keeps: covers tracking error, delay and noise of points
-        rate [1/s], default 20.0, allowed 0.5 to 200: how quickly a clearance may close on its margin: larger comes close quicker
-        braking_fraction, default 0.5, allowed 0.05 to 1: share of the hardest deceleration that is counted on
-        correction, default 0.5, allowed 0.01 to 1: share of an excess of closing speed that one period takes away
-        max_rows, default 32, allowed 1 to 256: clearances that bound one command: the most critical ones
+        margin [m], default 0.005, allowed 0 to 0.5: clearance that every command keeps: larger allows for more tracking error, delay and noise
+        rate [1/s], default 20.0, allowed 0.5 to 200: largest closing speed per distance left to the margin: larger approaches faster, but reacts more to noise
+        braking_fraction, default 0.5, allowed 0.05 to 1: share of the largest possible deceleration that braking relies on: larger brakes later
+        correction, default 0.5, allowed 0.01 to 1: share of an excessive closing speed that is removed in one period: larger reacts harder
+        max_rows, default 32, allowed 1 to 256: largest number of clearances that constrain one command: the most critical ones
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -1554,18 +1554,18 @@ class PlannerSettings:
     """
     How a PathPlanner searches.
 
-        margin [m], default 0.06, allowed 0.001 to 0.5: clearance of a wide way, which is preferred
-        floor [m], default 0.005, allowed 0.0001 to 0.5: clearance that every way keeps: smaller finds narrower ways
-        allowance [m], default 0.02, allowed 0 to 0.2: how deep an ellipsoid may be in something at start or goal
-        pair_allowance [m], default 0.02, allowed 0 to 0.2: the same of two links below their contact
-        slack [m], default 0.002, allowed 1e-05 to 0.1: what an edge may come nearer than its margin: larger is quicker
-        fade [m], default 0.3, allowed 0.01 to 10: way on which what an end may come nearer fades
-        range [rad], default 1.0, allowed 0.01 to 10: longest edge of the search trees
-        max_nodes, default 10000, allowed 2 to 1e+06: of both trees: the budget of a search
-        max_iterations, default 40000, allowed 1 to 2e+09: of a search: its budget
-        max_checks, default 2000000, allowed 1 to 2e+09: of clearances in a plan: its budget of work, some 2 s
-        max_seconds [s], default inf, allowed 1e-09 to inf: of a search; motions then do not repeat
-        shortcuts, default 100, allowed 0 to 1e+06: attempts to shorten a path: more are shorter and later
+        margin [m], default 0.06, allowed 0.001 to 0.5: preferred clearance of paths: larger stays farther from obstacles, on longer paths
+        floor [m], default 0.005, allowed 0.0001 to 0.5: least clearance of every path: smaller passes narrower gaps
+        allowance [m], default 0.02, allowed 0 to 0.2: largest depth of a covering ellipsoid in an obstacle that is accepted at start and goal
+        pair_allowance [m], default 0.02, allowed 0 to 0.2: largest depth of two links of the arm in each other that is accepted at start and goal
+        slack [m], default 0.002, allowed 1e-05 to 0.1: distance by which an edge may undercut its margin (a quarter of the margin if that is more): larger checks faster
+        fade [m], default 0.3, allowed 0.01 to 10: distance from start or goal over which their smaller margins return to the full one
+        range [rad], default 1.0, allowed 0.01 to 10: length of the longest edge in the search trees
+        max_nodes, default 10000, allowed 2 to 1e+06: largest number of nodes in both trees: the budget of one search
+        max_iterations, default 40000, allowed 1 to 2e+09: largest number of iterations of one search: its budget
+        max_checks, default 2000000, allowed 1 to 2e+09: largest number of clearance checks in one plan: its budget, some 2 s of work
+        max_seconds [s], default inf, allowed 1e-09 to inf: time limit of one search; with a limit motions do not repeat
+        shortcuts, default 100, allowed 0 to 1e+06: number of attempts to shorten a path: more give shorter paths, later
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -1666,8 +1666,8 @@ class TimedPathSettings:
     """
     How fast the reference of an OnlinePlanner passes a path.
 
-        wide [m], default 0.03, allowed 0.001 to 0.1: clearance below which a place is narrow: barriers leave room there
-        lead [rad], default 0.4, allowed 0.01 to 3: distance at which the reference waits for the arm: larger is faster and cuts corners
+        wide [m], default 0.03, allowed 0.001 to 0.1: clearance below which a place on the path counts as narrow: activation distances are shorter there
+        lead [rad], default 0.4, allowed 0.01 to 3: distance at which the reference waits for the arm: larger is faster, but cuts corners
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -2232,19 +2232,19 @@ def replay(path: str | os.PathLike[str], *, arm: Arm | None = None, settings: Co
 
 class BarrierSettings:
     """
-    The spring that pulls to the goal, and the barriers that bend its way.
+    The spring to the goal, and the barriers that bend its acceleration.
 
-        stiffness [1/s^2], default 4.0, allowed 0.01 to 100: of the spring to the goal: larger is faster and brakes later
-        damping [1/s], default 4.0, allowed 0.1 to 50: of the spring: 2 sqrt(stiffness) does not overshoot; larger is slower
-        activation [m], default 0.1, allowed 0.01 to 1: clearance to obstacles at which barriers begin: larger turns earlier and gentler, smaller passes narrower gaps
-        strength, default 0.1, allowed 0.0001 to 10: of obstacle barriers: larger turns the motion away earlier
-        power, default 2.0, allowed 2 to 6: of all barriers: larger stays flat longer and rises steeper
-        floor [m], default 0.002, allowed 0.0001 to 0.02: clearance below which the arm counts as inside and is pushed out
-        temperature [m], default 0.002, allowed 0.0001 to 0.02: smoothing over points and ellipsoids: larger is smoother and less exact
-        limit_activation [rad], default 0.1, allowed 0.01 to 1: way to a position limit at which its barrier begins; of a sliding joint at most a twentieth of its range
-        limit_strength, default 0.02, allowed 0.0001 to 10: of position limits' barriers
-        self_activation [m], default 0.05, allowed 0.005 to 0.5: clearance between links at which their barrier begins
-        self_strength, default 0.02, allowed 0.0001 to 10: of the barriers between links
+        stiffness [1/s^2], default 4.0, allowed 0.01 to 100: stiffness of the spring to the goal: larger is faster and brakes later
+        damping [1/s], default 4.0, allowed 0.1 to 50: damping of that spring: 2 sqrt(stiffness) does not overshoot, larger is slower
+        activation [m], default 0.1, allowed 0.01 to 1: activation distance of obstacle barriers: with a larger one the arm turns earlier and more gently, with a smaller one it passes narrower gaps
+        strength, default 0.1, allowed 0.0001 to 10: strength of obstacle barriers: larger turns the motion away earlier
+        power, default 2.0, allowed 2 to 6: exponent of all barriers: larger acts less far away and more steeply near contact
+        floor [m], default 0.002, allowed 0.0001 to 0.02: clearance below which the arm counts as inside a barrier and is pushed out
+        temperature [m], default 0.002, allowed 0.0001 to 0.02: smoothing length of the mean over near points and ellipsoids: larger is smoother and less exact
+        limit_activation [rad], default 0.1, allowed 0.01 to 1: activation distance of position limits; for a prismatic joint at most a twentieth of its range
+        limit_strength, default 0.02, allowed 0.0001 to 10: strength of the barriers of position limits: larger turns the motion away earlier
+        self_activation [m], default 0.05, allowed 0.005 to 0.5: activation distance between links of the arm: larger keeps them farther apart, smaller leaves more postures free
+        self_strength, default 0.02, allowed 0.0001 to 10: strength of the barriers between links: larger turns the motion away earlier
 
     A Controller refuses what is not allowed.
     """
@@ -2340,9 +2340,9 @@ class ArrivalSettings:
     When a goal counts as reached.
 
         joint [rad], default 0.01, allowed 1e-06 to 1: largest joint error that counts as arrived
-        sliding [m], default 0.001, allowed 1e-06 to 1: the same of sliding joints
-        position [m], default 0.001, allowed 1e-06 to 1: distance from a pose goal that counts as arrived
-        rotation [rad], default 0.0087, allowed 1e-06 to 3: angle from a pose goal that counts as arrived
+        sliding [m], default 0.001, allowed 1e-06 to 1: largest error of a prismatic joint that counts as arrived
+        position [m], default 0.001, allowed 1e-06 to 1: largest distance from a pose goal that counts as arrived
+        rotation [rad], default 0.0087, allowed 1e-06 to 3: largest angle from a pose goal that counts as arrived
         speed [rad/s], default 0.05, allowed 1e-06 to 100: largest joint speed that counts as arrived
 
     A Controller refuses what is not allowed.
@@ -2400,18 +2400,18 @@ class ArrivalSettings:
 
 class TrackingSettings:
     """
-    How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), with what the disturbance
-    observer found. Not for outputs of position and velocity, which the arm's own drives track.
+    Feedback that keeps the arm on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), plus the torque of the
+    disturbance observer. Not used with output position or velocity, which the arm's own drives track.
 
-        frequency [1/s], default 60.0, allowed 1 to 300: of the feedback to the reference: larger is stiffer, and shakes with noise and delay
-        damping, default 1.0, allowed 0.1 to 10: of the feedback: 1 is critical; unknown rotor inertias lower it, delay and noise ask for less
-        velocity_filter [s], default 0.004, allowed 1e-05 to 1: of measured velocities, against what was predicted: longer is calmer and later
-        observer_time [s], default 0.05, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
-        observer_share, default 0.8, allowed 0 to 1: of the effort limits that the observer may make up for
-        largest_error [rad], default 0.2, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
-        servo_lag [rad], default 1.0, allowed 0.001 to 10: the same where the arm's own drives track position or velocity
-        stiffness [1/rad], default 0.0, allowed 0 to 100: of an impedance around the reference, effort limits per radian: lower yields more to pushes and payloads; 0: tracked stiffly
-        drift_gain [1/s], default 2.0, allowed 0 to 50: by which an output of velocity returns to the reference
+        frequency [1/s], default 60.0, allowed 1 to 300: natural frequency of the feedback to the reference: larger is stiffer, but noise and delay can make the arm shake
+        damping, default 1.0, allowed 0.1 to 10: damping ratio of the feedback: 1 is critical damping; unknown rotor inertias reduce it; lower it if delay or noise make the arm shake
+        velocity_filter [s], default 0.004, allowed 1e-05 to 1: time constant of the filter that corrects predicted velocities by measured ones: longer is calmer but lags more
+        observer_time [s], default 0.05, allowed 0.005 to inf: time constant of the disturbance observer (friction, payload, wrong gravity): shorter compensates faster, but noise and delay can make the arm shake; inf: no observer
+        observer_share, default 0.8, allowed 0 to 1: largest torque that the observer compensates, as a share of the effort limits
+        largest_error [rad], default 0.2, allowed 0.001 to 10: tracking error above which the reference restarts at the arm; for a prismatic joint a fifth of it [m]
+        servo_lag [rad], default 1.0, allowed 0.001 to 10: tracking error above which the reference restarts where the arm's own drives track position or velocity
+        stiffness [1/rad], default 0.0, allowed 0 to 100: stiffness of a compliant arm, in effort limits per radian of tracking error: 0.01 is very soft, larger is stiffer. 0, the default, switches compliance off: the arm is then stiffest
+        drift_gain [1/s], default 2.0, allowed 0 to 50: gain from position error to commanded velocity, with velocity output: larger returns to the reference faster
 
     A Controller refuses what is not allowed.
     """
@@ -2495,10 +2495,10 @@ class SpeedLimitSettings:
     Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between
     near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].
 
-        near_speed [m/s], default 0.25, allowed 0.02 to 10: that no frame of the arm exceeds at near_distance from an obstacle, and nearer
-        near_distance [m], default 0.1, allowed 0 to 10: to obstacles, up to which near_speed is the limit
-        far_speed [m/s], default 1.5, allowed 0.02 to 10: that no frame of the arm exceeds anywhere
-        far_distance [m], default 1.0, allowed 0.01 to 10: to obstacles, from which far_speed is the limit: the nearer to near_distance, the harder the arm brakes between
+        near_speed [m/s], default 0.25, allowed 0.02 to 10: largest speed of any frame of the arm at near_distance from an obstacle or closer
+        near_distance [m], default 0.1, allowed 0 to 10: distance to obstacles up to which near_speed is the limit
+        far_speed [m/s], default 1.5, allowed 0.02 to 10: largest speed of any frame of the arm at far_distance from obstacles or farther
+        far_distance [m], default 1.0, allowed 0.01 to 10: distance to obstacles from which far_speed is the limit; between near_distance and far_distance the limit rises with distance: the closer the two, the harder the arm has to brake
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -2551,11 +2551,11 @@ class InputSettings:
     """
     How velocities, twists and trajectories are followed, see Controller.
 
-        response [1/s], default 20.0, allowed 1 to 100: to a velocity that is wanted: larger is quicker, and passes on its noise
-        timeout [s], default 0.25, allowed 0.001 to inf: age from which a velocity or a twist counts as zero
-        singular, default 0.05, allowed 0.0001 to 1: singular value of a frame's Jacobian [m and rad] near which a twist is slowed; it rests at a fifth of it: larger is calmer, and stops farther from where the arm is stretched
-        frequency [1/s], default 10.0, allowed 1 to 50: of the return to a trajectory or to the planner's path: larger is stiffer
-        lead [rad], default 0.1, allowed 0.001 to 10: error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]
+        response [1/s], default 20.0, allowed 1 to 100: rate of the response to a commanded velocity or twist: larger responds faster, but passes on more noise
+        timeout [s], default 0.25, allowed 0.001 to inf: age above which a commanded velocity or twist counts as zero
+        singular, default 0.05, allowed 0.0001 to 1: smallest singular value of the frame's Jacobian [m and rad] at which a twist keeps its full speed; the arm stops at a fifth of it: larger is calmer, but stops farther from the stretched arm
+        frequency [1/s], default 10.0, allowed 1 to 50: natural frequency of the return to a trajectory or to the planner's path: larger is stiffer
+        lead [rad], default 0.1, allowed 0.001 to 10: tracking error above which a trajectory slows down; at twice as much it waits; for a prismatic joint a fifth of it [m]
 
     A Controller refuses what is not allowed.
     """
@@ -2614,9 +2614,9 @@ class OnlinePlannerSettings:
     """
     The planner that runs beside the loop: how it searches, and how its paths are followed.
 
-        period [s], default 0.02, allowed 0.001 to 10: between two looks of the planner at the scene: shorter reacts earlier
-        patience [s], default 1.0, allowed 0.05 to 60: without progress until another path is looked for
-        retry [s], default 1.0, allowed 0.05 to 600: until a failed search is repeated in the same scene
+        period [s], default 0.02, allowed 0.001 to 10: time between two checks of the path: shorter reacts earlier
+        patience [s], default 1.0, allowed 0.05 to 60: time without progress after which another path is searched
+        retry [s], default 1.0, allowed 0.05 to 600: time after which a failed search is repeated in the same scene
 
     A Controller refuses what is not allowed.
     """
@@ -2673,15 +2673,15 @@ class OnlinePlannerSettings:
 
 class LookAheadSettings:
     """
-    Trajectories out of the way of what moves, see Controller.
+    Prediction and avoidance of moving obstacles, see Controller.
 
-        horizon [s], default 2.0, allowed 0.1 to 30: how far is looked ahead: longer sees what is fast, and takes more time
-        period [s], default 0.01, allowed 0.0005 to 0.2: of the steps of predicted motions: longer is quicker and coarser
-        delay [s], default 0.1, allowed 0.005 to 5: from one look to the next, from when on what it found is followed
-        clearance [m], default 0.004, allowed -0.1 to 0.5: that a predicted motion has to keep from obstacles
-        tries, default 500, allowed 1 to 100000: trajectories that are drawn in one look
-        slow_after, default 3.0, allowed 2 to 1000: age of a look, in delays, from which the arm is slowed beside what moves: smaller is safer where processor time is short
-        rest_after, default 10.0, allowed 2 to 10000: age of a look, in delays, at which the arm rests beside what moves
+        horizon [s], default 2.0, allowed 0.1 to 30: length of the prediction: longer sees fast obstacles earlier, but takes more processor time
+        period [s], default 0.01, allowed 0.0005 to 0.2: time step of predicted motions: longer is faster to compute and coarser
+        delay [s], default 0.1, allowed 0.005 to 5: time from one prediction to the next, and from its start until its result is used
+        clearance [m], default 0.004, allowed -0.1 to 0.5: least clearance that a predicted motion must keep from obstacles
+        tries, default 500, allowed 1 to 100000: number of avoidance trajectories that one prediction tries: more find a way out more often, but take more processor time
+        slow_after, default 3.0, allowed 2 to 1000: age of the newest prediction above which the arm slows down near moving obstacles, as a multiple of delay: smaller is safer where processor time is short
+        rest_after, default 10.0, allowed 2 to 10000: age of the newest prediction at which the arm stops near moving obstacles, as a multiple of delay
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -2752,10 +2752,10 @@ class LocalMinimumSettings:
     """
     Sub-goals where the arm is stuck and there is no path.
 
-        patience [s], default 0.6, allowed 0.05 to 60: without progress until a sub-goal is taken
-        fraction, default 0.05, allowed 0.0001 to 0.99: progress is a squared distance to the goal that falls by this share
-        leg [s], default 2.0, allowed 0.1 to 60: longest way to the first sub-goal; n times that to the n-th
-        spread [rad], default 1.7, allowed 0.01 to 20: how far each joint of the first sub-goal may be; n times that of the n-th
+        patience [s], default 0.6, allowed 0.05 to 60: time without progress after which the arm goes to a sub-goal
+        fraction, default 0.05, allowed 0.0001 to 0.99: share by which the squared distance to the goal must fall to count as progress
+        leg [s], default 2.0, allowed 0.1 to 60: longest duration of the motion to the first sub-goal; n times as long for the n-th
+        spread [rad], default 1.7, allowed 0.01 to 20: largest distance of each joint of the first sub-goal from the arm; n times as far for the n-th
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -2826,21 +2826,21 @@ class ControllerSettings:
     All settings of a Controller. Every part but `speed_limits` is on by default; `planner=None`, `look_ahead=None` and
     `local_minimum=None` leave a part out, for comparisons.
 
-        period [s], default 0.001, allowed 0.0001 to 0.1: between two calls of step; limits and clearances hold at samples so far apart
+        period [s], default 0.001, allowed 0.0001 to 0.1: time between two calls of step; limits and clearances hold at these samples
         speed, default 1.0, allowed 0.01 to 1: share of the velocity and acceleration limits that motions use: less is slower and calmer
-        limit_margin, default 0.02, allowed 0 to 0.5: share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding
-        effort_margin, default 0.05, allowed 0 to 0.5: share of the effort limits that is left for what the model lacks
-        position_margin [rad], default 0.0, allowed 0 to 1: by which position limits are moved inwards
-        stop_time [s], default 0.1, allowed 0.005 to 10: time constant of the damped stop
-        stop_damping, default 0.25, allowed 0.001 to 10: of a stop where the mass matrix is unusable, as a share of effort limit / velocity limit
-        torque_weight, default 1e-06, allowed 0 to 1000: price of torque against tracking: larger saves torque and sags
-        slack_weight, default 1000.0, allowed 1 to 1e+06: price of leaving velocity and acceleration limits against tracking
-        velocity_overrun, default 1.2, allowed 1 to 10: factor up to which velocity limits give way to clearances
-        acceleration_overrun, default 10.0, allowed 1 to 100: factor up to which acceleration limits give way to clearances
-        obstacle_timeout [s], default inf, allowed 0.001 to inf: age from which obstacles are stale and the arm stops
-        local_activation, default True, allowed 0 to 1: barriers leave room at goals and narrow places among what rests; without it the arm creeps there
-        synchronous, default False, allowed 0 to 1: planner, look-ahead and posture search run inside step: motions repeat bit for bit, steps take longer
-        seed, default 0, allowed 0 to 1.84467e+19: of every random draw
+        limit_margin, default 0.02, allowed 0 to 0.5: share of the limits of velocity, acceleration, jerk and torque rate that stays unused, for noise, delay and rounding: larger is safer and slower
+        effort_margin, default 0.05, allowed 0 to 0.5: share of the effort limits that stays unused, for errors of the model: larger is safer and slower
+        position_margin [rad], default 0.0, allowed 0 to 1: distance by which position limits are moved inwards
+        stop_time [s], default 0.1, allowed 0.005 to 10: time constant of the emergency stop: shorter brakes harder
+        stop_damping, default 0.25, allowed 0.001 to 10: joint damping of the emergency stop without a mass matrix, in units of effort limit / velocity limit
+        torque_weight, default 1e-06, allowed 0 to 1000: weight of torque relative to acceleration error: larger saves torque, but the arm sags
+        slack_weight, default 1000.0, allowed 1 to 1e+06: weight of exceeding velocity and acceleration limits, relative to acceleration error: larger exceeds them less
+        velocity_overrun, default 1.2, allowed 1 to 10: largest velocity that a clearance may demand, as a multiple of the velocity limit
+        acceleration_overrun, default 10.0, allowed 1 to 100: largest acceleration that a clearance may demand, as a multiple of the acceleration limit
+        obstacle_timeout [s], default inf, allowed 0.001 to inf: age above which obstacles are stale and the arm stops
+        local_activation, default True, allowed 0 to 1: shorter activation distances near the goal and in narrow places, among static obstacles; without it the arm creeps there
+        synchronous, default False, allowed 0 to 1: run planner, look-ahead and posture search inside step: motions repeat bit for bit, steps take longer
+        seed, default 0, allowed 0 to 1.84467e+19: seed of all random numbers
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -3022,96 +3022,98 @@ class ControllerSettings:
 
 def controller_settings_fields() -> list[dict[str, float | str]]:
     """
-    Every setting of the tree: name (dotted), unit, default, least and most allowed, what it trades, and whether the part
+    Every setting of the tree: name (dotted), unit, default, least and most allowed, what it is and trades, and whether the part
     that its name begins with is optional, so that None leaves it out.
     """
 
 class TrajectoryBehaviour(enum.Enum):
-    """
-    What a Controller does with a trajectory where something is in the way.
-    """
+    """What a Controller does if an obstacle blocks its trajectory."""
 
     keep_path = 0
     """
-    Stay on the path: slow down and wait before what blocks it, go on when it is free.
+    Stay on the path: slow down, wait in front of the obstacle, continue when the path is free.
     """
 
     steer = 1
-    """Go around, and rejoin."""
+    """Leave the path to get around the obstacle, then return to it."""
 
 class TwistFreedom(enum.Enum):
-    """Which part of a twist is not asked for."""
+    """Which part of a twist is left free."""
 
     none = 0
-    """Translation and rotation are both asked for."""
+    """Translation and rotation are both commanded."""
 
     rotation = 1
     """
-    Only the velocity of the frame's origin is: the frame may turn as it likes.
+    Only the velocity of the frame's origin is commanded; its rotation is free.
     """
 
 class SafetyStatus(enum.IntEnum):
     """How safe a command is, by severity. Every command may be sent."""
 
     ok = 0
-    """
-    The motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for.
-    """
+    """The motion is as requested; a velocity or twist is kept within 5 %."""
 
     limited = 1
-    """A limit of the arm or a clearance bends it."""
+    """A limit of the arm or a clearance changes it."""
 
     relaxed = 2
     """
-    Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.
+    Limits of jerk, velocity, acceleration or Cartesian speed gave way to clearances, position or torque limits.
     """
 
     margin_lost = 3
-    """Not every safety margin can be kept; nothing is touched."""
+    """
+    Not every safety margin or position limit can be kept; nothing is touched.
+    """
 
     tracking_lost = 4
     """
-    The arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position agrees with no motion: the arm comes to rest.
+    The arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its measured position: it comes to rest.
     """
 
     stale = 5
     """
-    The obstacles are older than obstacle_timeout, or were never set although it is: the arm stops.
+    The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.
     """
 
     stopping = 6
-    """The input is unusable or the program was not solved: a damped stop."""
+    """
+    The input is unusable or the quadratic program was not solved: a damped stop.
+    """
 
     clearance_lost = 7
-    """An ellipsoid of the arm reaches into something."""
+    """
+    A covering ellipsoid of the arm reaches into an obstacle, a plane or another link.
+    """
 
 class Activity(enum.Enum):
-    """What a controller is about."""
+    """What a controller is doing."""
 
     no_goal = 0
     """
-    None was given, or no velocity for a while: the arm comes to rest, and evades.
+    No goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles.
     """
 
     moving = 1
-    """On the way to its goal, or as it is told."""
+    """On the way to its goal, or following a velocity, twist or trajectory."""
 
     waiting = 2
-    """Until a posture is found, or a trajectory that it keeps to is free."""
+    """Waiting until a posture is found, or until its trajectory is free."""
 
     arrived = 3
     """The goal is reached."""
 
     blocked = 4
     """
-    No path leads to the goal, for 0.2 s at least, see Controller.explain; the arm goes as near as it can.
+    No path leads to the goal, for at least 0.2 s, see Controller.explain; the arm goes as near as it can.
     """
 
     stale = 5
     """As SafetyStatus.stale: the arm stops."""
 
 class Command:
-    """What one step of a Controller gives; arrays are copies."""
+    """The result of one step of a Controller; arrays are copies."""
 
     @property
     def status(self) -> SafetyStatus:
@@ -3123,131 +3125,138 @@ class Command:
 
     @property
     def torque(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) [Nm | N], gravity included; zero where the output is not torque."""
+        """(nv,) torque [Nm | N], gravity included; zero without torque output."""
 
     @property
     def torque_without_gravity(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) the same for arms that hold themselves, such as Franka's; nan where the arm has no inertias.
+        (nv,) torque without gravity [Nm | N], for arms that compensate gravity themselves; nan if the arm has no inertias.
         """
 
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) of the arm: the reference's with feedback [rad/s^2 | m/s^2]."""
+        """
+        (nv,) acceleration of the arm: that of the reference plus feedback [rad/s^2 | m/s^2].
+        """
 
     @property
     def wanted(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].
+        (nv,) desired acceleration: after barriers, before any limit [rad/s^2 | m/s^2].
         """
 
     @property
     def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) of the reference after this period [rad/s | m/s]."""
+        """(nv,) velocity of the reference after this period [rad/s | m/s]."""
 
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) of the reference after this period [rad | m]; nan until a state was known.
+        (nv,) position of the reference after this period [rad | m]; nan until a state was known.
         """
 
     @property
     def disturbance(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) force that the observer makes up for, of torque outputs [Nm | N].
+        (nv,) disturbance that the observer compensates, with torque output [Nm | N].
         """
 
     @property
     def rotors(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) inertia that it found and the model lacks [kg m^2 | kg]."""
+        """(nv,) estimated rotor inertia that the model lacks [kg m^2 | kg]."""
 
     @property
     def input_change(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) what is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the
-        reference after this period, less the velocity asked for. Of a twist V: J^+ (J v - V), damped where it is
-        singular, so that what the frame does not feel does not count. Of a trajectory: its velocity at the clock, at
-        full speed. Zero without one of these.
+        (nv,) difference between the velocity of the reference after this period and the requested one [rad/s | m/s]. For a
+        twist V: J^+ (J v - V), damped near singularities; motion in the null space of J does not count. For a
+        trajectory the requested velocity is that at its clock, at full speed. Zero without one of these.
         """
 
     @property
     def tracking_error(self) -> float:
-        """Largest difference of the arm from the reference [rad | m]."""
+        """Largest joint error between arm and reference [rad | m]."""
 
     @property
     def deviation(self) -> float:
         """
-        Distance of the reference from the straight lines between a trajectory's samples, in the farthest joint [rad | m]: the
-        nearest of the lines within 0.05 s of where the trajectory's clock is. On the way to a first sample after zero: from
-        that way. How late it is: `delay`.
+        Largest joint distance of the reference from the straight lines between a trajectory's samples [rad | m]; lines within
+        0.05 s of the trajectory's clock count. Before the first sample: distance from the approach to it. See `delay` for
+        how late it is.
         """
 
     @property
     def delay(self) -> float:
-        """How far the trajectory's clock is behind [s]."""
+        """Time by which the trajectory's clock is late [s]."""
 
     @property
     def clearance(self) -> float:
         """
-        The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.
+        Least clearance of the covering body [m], exact below the activation distances; inf: far; nan: unknown.
         """
 
     @property
     def coordinate(self) -> int:
-        """Whose that is, see Controller.labels; -1: none within reach."""
+        """
+        Index in Controller.labels of the pair with the least clearance; -1: nothing is near.
+        """
 
     @property
     def point(self) -> int:
-        """The obstacle point, where it is one; else -1."""
+        """Index of the obstacle point of that pair; -1: none."""
 
     @property
     def bound_by(self) -> int:
-        """The coordinate whose clearance bends the motion most; -1: none."""
+        """
+        Index in Controller.labels of the clearance that changes the motion most; -1: none.
+        """
 
     @property
     def distance(self) -> float:
         """
-        To the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.
+        Distance to the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.
         """
 
     @property
     def speed(self) -> float:
-        """Of the arm's fastest frame [m/s]; nan: unknown."""
+        """Speed of the arm's fastest frame [m/s]; nan: unknown."""
 
     @property
     def speed_limit(self) -> float:
-        """For every frame [m/s]; inf: none; nan: unknown."""
+        """Speed limit of every frame [m/s]; inf: none; nan: unknown."""
 
     @property
     def limits(self) -> list[Limit]:
-        """(nv) the limits in the way of each joint."""
+        """(nv) limits that restrict each joint."""
 
     @property
     def avoiding(self) -> bool:
-        """Follows a trajectory out of the way of what moves."""
+        """
+        Whether the arm follows an avoidance trajectory, out of the way of a moving obstacle.
+        """
 
     @property
     def on_path(self) -> bool:
-        """Follows a path of the planner."""
+        """Whether the arm follows a path of the planner."""
 
     @property
     def look_ahead_age(self) -> float:
         """
-        Time since the state from which the newest look-ahead that is followed was computed [s]: it grows where threads get too
-        little processor time, or steps come faster than real time. 0: the part is off, or runs inside `step`.
+        Age of the newest look-ahead: time since the state that it started from [s]. It grows if threads get too little processor
+        time, or if steps come faster than real time. 0: look-ahead is off, or runs inside `step`.
         """
 
     @property
     def planner_age(self) -> float:
         """
-        The same of the planner's newest look [s]; 0 also where there is nothing to plan.
+        Age of the planner's newest check, likewise [s]; 0 also if there is nothing to plan.
         """
 
     @property
     def pace(self) -> float:
         """
-        Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`
-        delays, then linear, 0 from `look_ahead.rest_after` delays on.
+        Share of its speed that the arm may use near moving obstacles, given the age of the look-ahead: 1 up to
+        `look_ahead.slow_after` delays, then linear, 0 from `look_ahead.rest_after` delays on.
         """
 
     def __getstate__(self) -> dict[str, Any]: ...
@@ -3258,7 +3267,7 @@ class Command:
 
 class Controller:
     """
-    State in, safe command out, once a period: planner, barriers, look-ahead and quadratic program in one.
+    Turns the arm's state into a safe command, once a period: planner, barriers, look-ahead and quadratic program in one.
     Goals and obstacles may be set from any thread. Raises ValueError that names the setting at fault.
     """
 
@@ -3266,81 +3275,83 @@ class Controller:
 
     def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None:
         """
-        From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses
-        of several frames at once, as of two arms. Joints that no pose asks to move stay where they are, and evade. Raises
-        ValueError that names the joint, its value and what is allowed; the goal before stays.
+        Sets the goal, from the next step on: a configuration (nv,) [rad | m] within the limits, a moving goal, a pose, or
+        poses of several frames, as of two arms. Joints that no pose needs stay where they are, and avoid obstacles. Raises
+        ValueError that names the joint, its value and what is allowed; the previous goal then stays.
         """
 
     def set_velocity(self, v: numpy.typing.ArrayLike) -> None:
         """
-        Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. A joint stops at its
-        position limit while the others go on. Obstacles steer the arm around them and stop it. After `inputs.timeout` without
-        another order the arm stops. Raises ValueError that names the joint and what is allowed; the order before stays.
+        Commands joint velocities (nv,) [rad/s | m/s]; needs no goal. One factor scales them down to the limits. A joint stops at
+        its position limit while the others continue. The arm slides along obstacles or stops at them. After `inputs.timeout`
+        without a new request the arm stops. Raises ValueError that names the joint and what is allowed; the previous request
+        then stays.
         """
 
     def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False, free: TwistFreedom | str = 'none') -> None:
         """
-        The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of
-        the world or, `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the
-        largest s in [0, 1] that joint limits and singular configurations leave. With free="rotation" the rotation is not
-        asked for, and its three numbers are not read: for arms of less than six joints. Along obstacles the arm slides;
-        `command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the frames that there are,
-        or the names of what can be left free.
+        Commands the twist (6,) of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in axes of the world or,
+        with `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the largest s
+        in [0, 1] that joint limits and singular configurations allow. With free="rotation" the last three numbers are
+        ignored and the frame may turn: for arms with fewer than six joints. Along obstacles the arm slides;
+        `command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the known frames, or the
+        values of `free`.
         """
 
     def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, behaviour: TrajectoryBehaviour | str = 'keep_path') -> None:
         """
-        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing, but for a
-        sample that is there twice. Cubics between them keep
-        monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after
-        zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that
-        limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.
-        Joints without limits take the short way from sample to sample, at most half a turn. `keep_path` slows
-        down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`
-        say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.
+        Follows joint positions q (K, nv) [rad | m] at times (K,) [s] after the next step. Times must increase; a sample may be
+        there twice. Cubics between samples keep monotone samples monotone and dwells still, within 0.01 rad (2 mm) of the
+        straight lines. The arm has until the first time, at most 3600 s, to reach the first sample, which may differ from its
+        present state. If time stamps bunch up so that limits forbid them, they move by up to 0.2 s; if that is not enough, the
+        trajectory's clock slows down. Joints without limits take the short way between samples, at most half a turn.
+        `keep_path` slows down and waits in front of an obstacle, `steer` goes around it and returns. `command.deviation` and
+        `command.delay` say how far off and how late the arm is. Raises ValueError that names sample, joint, value and what is allowed.
         """
 
     def clear_goal(self) -> None:
-        """The arm comes to rest where it is, and goes on evading."""
+        """
+        Removes the goal: the arm comes to rest where it is, and still avoids moving obstacles.
+        """
 
     def restart(self) -> None:
         """
-        The next step begins where the arm is, as a first one does: call it where something else has moved the arm. The goal
-        stays. Without it the same happens once five measured positions in a row agree with each other and not with the
-        command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.
+        Restarts the reference at the measured state of the next step: call it after something else has moved the arm. The goal
+        stays. Without this call the reference restarts once five measured positions in a row agree with each other but not
+        with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.
         """
 
     def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape]) -> None:
         """
-        From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which
-        covers shapes by balls without gaps. They move on by their velocities until they are set again.
+        Replaces all obstacles, from the next step on: points, a shape, or a list of both. Balls cover each shape without gaps,
+        see `sidestep.obstacles.obstacles_from_shapes`. Obstacles move on by their velocities until the next call.
         """
 
     def set_arm(self, arm: Arm) -> None:
         """
-        Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later: prepared beside
-        the loop in some tenths of a second, taken over by the next step. Objects stay attached; goals are planned for anew.
+        Replaces body, inertias and pairs, for example by a finer cover; joints and limits must be the same. Takes some tenths of
+        a second beside the loop; the next step uses the new body. Objects stay attached; the planner plans again.
         Raises ValueError that says what differs.
         """
 
     def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, **options: Any) -> None:
         """
-        An object that a link holds from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
+        Attaches an object to a link, from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
         mass=0.3, may_touch=["fr3_leftfinger", "fr3_rightfinger"]), with the options of `sidestep.arm.attachment`; a
-        shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
-        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=["table"] the same
-        holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.
-        Warns where the object is far away from the link, as with a pose in the world.
+        shape, or points (N, 3) in the object's frame. The object avoids obstacles and the links that other joints move, and its
+        mass counts. Links that overlap with it now may stay as close as they are. With rests_on=["table"] it may also stay as
+        close to the obstacle 'table' as it is now, until it is lifted off. Takes less than a second, while steps continue.
+        Raises ValueError that names what is wrong; nothing changes then. Warns if the object is far from the link.
         """
 
     def detach(self, name: str) -> None:
         """
-        Lets an object go from the next step on. Raises ValueError that lists what is attached.
+        Releases an object, from the next step on. Raises ValueError that lists the attached objects.
         """
 
     @property
     def attached(self) -> list[str]:
-        """The names of the objects that are attached."""
+        """Names of the attached objects."""
 
     @property
     def arm(self) -> Arm:
@@ -3503,16 +3514,16 @@ class MotionRecord:
 
 def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
     """
-    Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
-    within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
+    Moves an ideal robot, which tracks the command exactly, by semi-implicit Euler: v += a T, q += v T. Ends when every joint
+    is within tolerance [rad], a prismatic one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
     ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
 
 class RealTimeRun:
     """
     Runs a Controller at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1
-    periods after the start, and what is late is not left out. The arm does what it is told: v += a T, q += v T. Until it
-    has ended the controller is its alone, but for goals, obstacles and what the planner knows. steps: at most 100,000,000,
+    periods after the start, and late steps are not skipped. The arm is an ideal robot: v += a T, q += v T. Until the run
+    ends the controller is reserved for it: others may only set goals and obstacles, and read what the planner knows. steps: at most 100,000,000,
     of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault,
     RuntimeError if the controller is in use.
     """
