@@ -47,10 +47,10 @@ The tree of `ControllerSettings`. Set one by its name:
 `ss.ControllerSettings(barriers=BarrierSettings(activation=0.15))`, with `BarrierSettings` from `sidestep.controller`.
 Scenario files use the same names. A value out of range is refused by name.
 
-Units are those of turning joints; for sliding joints rad is m. A setting without unit has "-". `planner`, `look_ahead`
-and `local_minimum` may be None (in scenario files null), which leaves the part out. `speed_limits` is off by default.
-[Tuning](../how-to/tuning.md) says what to turn first.
-`python docs/make_reference.py` writes this page from what the core states.
+Units are those of revolute joints; for prismatic joints read m for rad. A setting without unit has "-". `planner`,
+`look_ahead` and `local_minimum` may be None (in scenario files null), which leaves the part out. `speed_limits` is off
+by default. [Tuning](../how-to/tuning.md) says what to turn first.
+`python docs/make_reference.py` writes this page from the tables in the core.
 
 """
 COMMANDS = """# Command line
@@ -72,7 +72,7 @@ def first_sentence(name: str, package: ModuleType = sidestep) -> str:
 
 def settings_table() -> list[str]:
     """The tree of the controller's settings, a row each, as the core states it."""
-    rows = ["| setting | default | unit | allowed | what it trades |\n|---|---|---|---|---|"]
+    rows = ["| setting | default | unit | allowed | what it is and trades |\n|---|---|---|---|---|"]
     for field in controller_settings_fields():
         least, most = (f"{field[end]:g}" for end in ("least", "most"))
         allowed = "on, off" if isinstance(field["default"], bool) else f"{least} to {most}"

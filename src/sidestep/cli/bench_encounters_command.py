@@ -17,7 +17,7 @@ RobotsOption: TypeAlias = Annotated[
 ]
 FileOption: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--file", help="Rows as they come (JSON lines); a run that was cut off goes on from there."),
+    typer.Option("--file", help="Rows as they come (JSON lines); an interrupted run continues from there."),
 ]
 ShardOption: TypeAlias = Annotated[
     str, typer.Option(metavar="K/N", help="Only the K-th of N equal parts, for several machines.")
@@ -28,7 +28,7 @@ def drives(
     robot: RobotsOption = None,
     count: Annotated[int, typer.Option(min=1, help="Drives of each robot.")] = 12,
     moving: Annotated[
-        float, typer.Option(min=0.0, metavar="SPEED", help="Of half of the balls [m/s].")
+        float, typer.Option(min=0.0, metavar="SPEED", help="Speed of half of the balls [m/s].")
     ] = 0.0,
     torque: Annotated[bool, typer.Option("--torque", help="Torque output, not acceleration.")] = False,
     seed: SeedOption = 0,
@@ -40,8 +40,8 @@ def drives(
 ) -> None:
     """Random velocity drives of 3 s among 25 balls; half of them may move.
 
-    Judged on exact meshes between samples. Steps beyond limits count before the first contact. Exit code: 0 when no
-    drive touches anything from which there is a way out, and velocity, position and torque limits are kept; else 1.
+    Contacts are checked on the exact meshes, also between samples. Steps beyond limits count before the first contact.
+    Exit code: 0 if no contact had a way out, and velocity, position and torque limits are kept; else 1.
     """
     from sidestep.bench import DriveSettings, drive_table, run_drives
 
@@ -77,8 +77,10 @@ def moving(
     told: Annotated[
         list[str] | None, typer.Option(help="exact, wrong, untold or late; may be repeated.")
     ] = None,
-    speed: Annotated[list[float] | None, typer.Option(help="[m/s]; may be repeated.")] = None,
-    runs: Annotated[int, typer.Option(min=1, help="In each cell.")] = 4,
+    speed: Annotated[
+        list[float] | None, typer.Option(help="Speed of the obstacle [m/s]; may be repeated.")
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Runs in each cell.")] = 4,
     torque: TorqueOption = False,
     seed: SeedOption = 0,
     file: FileOption = None,
@@ -87,7 +89,7 @@ def moving(
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """A ball or a capsule comes at an arm that holds still or moves, and the controller is told more or less of it.
+    """A ball or a capsule comes at an arm that holds still or moves, and the controller knows more or less of it.
 
     Told at 30 Hz: exact; wrong, with a velocity 30 % off; untold, without velocity; late, 50 to 100 ms old. FR3 and
     UR10 run every cell, other arms exact and untold. Judged on exact meshes between samples; for each contact a way out
@@ -123,7 +125,7 @@ def moving(
 def faults(
     robot: RobotsOption = None,
     case: Annotated[list[str] | None, typer.Option(help="One fault; may be repeated [default: all].")] = None,
-    runs: Annotated[int, typer.Option(min=1, help="Of each fault and robot.")] = 2,
+    runs: Annotated[int, typer.Option(min=1, help="Runs of each fault and robot.")] = 2,
     acceleration: Annotated[
         bool, typer.Option("--acceleration", help="Acceleration output, carried out exactly, not torque.")
     ] = False,

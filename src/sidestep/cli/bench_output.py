@@ -24,7 +24,7 @@ FinerOption: TypeAlias = Annotated[
     bool,
     typer.Option(
         "--finer",
-        help="Where the arm does not arrive, and touches nothing, run again with finer covers of links.",
+        help="If the arm does not arrive and touches nothing, run again with finer covers of links.",
     ),
 ]
 OwnMethodOption: TypeAlias = Annotated[
@@ -37,12 +37,16 @@ OwnMethodOption: TypeAlias = Annotated[
 TorqueOption: TypeAlias = Annotated[
     bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
 ]
-SpacingOption: TypeAlias = Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")]
-PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Of those points [m].")]
+SpacingOption: TypeAlias = Annotated[
+    float, typer.Option(min=1e-4, help="Distance between points on surfaces [m].")
+]
+PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Radius of those points [m].")]
 DurationOption: TypeAlias = Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")]
 ToleranceOption: TypeAlias = Annotated[
     float,
-    typer.Option(min=1e-6, help="Arrived when every joint is this near [rad]; sliding joints a tenth [m]."),
+    typer.Option(
+        min=1e-6, help="Largest joint error at arrival [rad]; of prismatic joints a tenth of it [m]."
+    ),
 ]
 PeriodOption: TypeAlias = Annotated[float, typer.Option(min=1e-5, help="Control period [s].")]
 JobsOption: TypeAlias = Annotated[

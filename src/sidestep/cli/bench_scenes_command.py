@@ -60,7 +60,7 @@ def motion_bench_maker(
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
     ] = False,
     optimum: Annotated[
-        bool, typer.Option("--optimum", help="Also the time over the shortest with a limit of jerk; slow.")
+        bool, typer.Option("--optimum", help="Also the time over the shortest one with a jerk limit; slow.")
     ] = False,
     spacing: SpacingOption = SPACING,
     point_radius: PointRadiusOption = POINT_RADIUS,
@@ -109,12 +109,12 @@ def motion_bench_maker(
 def dynamic(
     robot: RobotOption = "fr3",
     problems: Annotated[int, typer.Option(min=0, help="Random problems of each kind.")] = 10,
-    obstacles: Annotated[int, typer.Option(min=0, help="Balls at rest in each of them.")] = 5,
+    obstacles: Annotated[int, typer.Option(min=0, help="Static balls in each problem.")] = 5,
     seed: SeedOption = 0,
     scenes: Annotated[
         Path | None, typer.Option(help="A folder of MotionBenchMaker: also in its scenes.")
     ] = None,
-    scene_problems: Annotated[int, typer.Option(min=1, help="How many of each of its sets.")] = 1,
+    scene_problems: Annotated[int, typer.Option(min=1, help="Problems of each of its sets.")] = 1,
     method: MethodOption = Method.controller,
     torque: TorqueOption = False,
     spacing: SpacingOption = SPACING,

@@ -108,10 +108,10 @@ def peers(
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """What other software takes for the nearest work to one control step, on one core, in one run.
+    """Times of other software for the work nearest to one control step, on one core, in one run.
 
     The thesis's equations by dense tensors in NumPy, by torch.autograd and by JAX; and among ten balls CBFpy's filter,
-    fabrics and a distance query of Coal. What is not installed is left out, and named.
+    fabrics and a distance query of Coal. The report names what is not installed, and leaves it out.
     """
     from sidestep.bench import PeerSettings, run_peers
 
@@ -140,10 +140,10 @@ def qp(
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """What solvers take for the quadratic programs of a step, and whether they find the same minimisers.
+    """Times of solvers for the quadratic programs of a step, and whether they find the same minimisers.
 
     The core's, DAQP, PIQP and ProxQP, each from scratch, by the time that they measure themselves. Programs are those
-    of the filter above a table; most have no constraint that holds. What is not installed is left out, and named.
+    of the filter above a table; most have no active constraint. What is not installed is left out, and named.
     """
     from sidestep.bench import QuadraticProgramSettings, run_quadratic_programs
 
@@ -196,7 +196,7 @@ def points(
 
 def realtime(
     robot: RobotOption = "fr3",
-    points: Annotated[int, typer.Option(min=1, help="Of the cloud of a table with objects.")] = 10_000,
+    points: Annotated[int, typer.Option(min=1, help="Points in the cloud of a table with objects.")] = 10_000,
     seconds: RowSecondsOption = 60.0,
     refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
     seed: SeedOption = 0,

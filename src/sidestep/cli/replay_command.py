@@ -63,7 +63,7 @@ def replay(
 
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="For the recordings; must have none.")],
+    folder: Annotated[Path, typer.Argument(help="Folder for the recordings; must not contain any.")],
     only: Annotated[
         list[str] | None, typer.Option(help="A case to record, may be repeated [default: all].")
     ] = None,

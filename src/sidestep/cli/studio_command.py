@@ -45,7 +45,9 @@ def studio(
     ] = None,
     ellipsoids: Annotated[
         int | None,
-        typer.Option(min=1, help="Per link of the covering body [default: as many as it takes, but slower]."),
+        typer.Option(
+            min=1, help="Ellipsoids per link of the covering body [default: as many as needed, but slower]."
+        ),
     ] = None,
     host: Annotated[
         str,
