@@ -263,9 +263,9 @@ def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario)
     session.stage.end = lambda torque: friction(0.0 * torque)  # type: ignore[method-assign]  # it stands still
     for _ in range(3000):
         session.step()
-        assert not session.snapshot().words.startswith("leaves")
+        assert not session.snapshot().words.startswith("leaving")
     session.handle(m.SetJointGoal(goal + 0.5))
-    assert run(session, 0.7).words.startswith("leaves a local minimum")
+    assert run(session, 0.7).words.startswith("leaving a local minimum")
 
 
 COMING = """\
@@ -305,7 +305,7 @@ def test_after_a_restart_it_does_not_step_aside_yet(make_session: MakeSession) -
     session = make_session(Scenario.from_text(COMING))
     for _ in range(2000):
         session.step()
-        if session.snapshot().words.startswith("steps out of the way"):
+        if session.snapshot().words.startswith("avoiding a moving obstacle"):
             break
     else:
         raise AssertionError("it did not step aside")
