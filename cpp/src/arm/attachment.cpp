@@ -16,7 +16,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double solid_level = 5.0;  // yᵀ Σ⁻¹ y on the boundary of a solid ellipsoid of covariance Σ.
+constexpr double solid_level = 5.0;  // Level yᵀ Σ⁻¹ y on the boundary of a solid ellipsoid of covariance Σ.
 constexpr double thinnest = 1e-6;    // Smallest semi-axis of a cover [m].
 // Distance of an object from its holder above which the pose is doubted, in sizes of the holder: a gripper that the arm
 // lacks may be in between.

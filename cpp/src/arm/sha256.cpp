@@ -7,7 +7,7 @@
 namespace sidestep {
 namespace {
 
-constexpr std::size_t block_size = 64;
+constexpr std::size_t block_size = 64;  // Bytes of a block of the hash.
 using Words = std::array<std::uint32_t, 8>;
 
 // The first 32 bits of the fractions of the cube roots of the first 64 primes.

@@ -111,7 +111,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   d.position_error = w.goal.position_error;
   d.rotation_error = w.goal.rotation_error;
 
-  // b_k·b with b = ∂U − G⁻¹ ∂U and w.attraction = −G⁻¹ ∂U; G_S in place of G if the pull is one-sided.
+  // b_k·b with b = ∂U − G⁻¹ ∂U and w.attraction = −G⁻¹ ∂U; G_S in place of G if the attraction is one-sided.
   const double desired = w.goal.gradient.norm();
   const double passed = w.attraction.norm();
   const double held_back = (w.goal.gradient + w.attraction).squaredNorm();

@@ -155,7 +155,7 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v, const Goal&
   const GoalFault fault = check(goal, robot_);
   w.metric.update(w.jacobian_transposed);
   if (fault == GoalFault::invalid || fault == GoalFault::outside_limits) {
-    w.goal.release();  // barriers, damping and recovery go on without a pull: an arm without a goal still evades
+    w.goal.release();  // barriers, damping and recovery go on without a goal: the arm still evades obstacles
   } else {
     w.goal.update(goal, w.state_, stiffness_);
   }

@@ -13,8 +13,7 @@ using Source = ClearanceItem::Source;
 
 constexpr const char* items_owner = "body clearance";  // Name in error messages.
 // Longest activation distance that a margin of a pair is a share of [m]: above that of links that are usually near.
-constexpr double most_activation =
-    0.05;  // [m] that a margin of a pair is a share of: longer than of links that are usually near
+constexpr double most_activation = 0.05;
 
 double across(const Eigen::Vector3d& offset, const Eigen::Vector3d& axis) { return offset.cross(axis).norm(); }
 

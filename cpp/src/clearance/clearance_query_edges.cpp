@@ -14,7 +14,7 @@ constexpr double exact_within = 0.015;
 
 /// How far an item comes towards what it keeps off, its margin included, within a share of an edge around a place.
 struct Motion {
-  double farthest;   // of any point on the whole edge [m]
+  double farthest;   // Largest motion of any point on the whole edge [m].
   double slope;      // Slope of the margin, per motion.
   double speed;      // Speed of the fastest point at the place [m].
   double curvature;  // Curvature of its path [m].

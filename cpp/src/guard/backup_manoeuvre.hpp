@@ -12,8 +12,8 @@ namespace sidestep {
 
 /// Torque of a stop, M a + h, with the mass matrix M and the bias h (Coriolis, centrifugal and gravity forces) of now.
 struct StopTorque {
-  const Eigen::MatrixXd& mass;  ///< M (nv × nv)
-  const Eigen::VectorXd& bias;  ///< h (nv) [Nm | N]
+  const Eigen::MatrixXd& mass;  ///< Mass matrix M (nv × nv).
+  const Eigen::VectorXd& bias;  ///< Bias h (nv) [Nm | N].
   double jerk_share;            ///< Share of the jerk limits with which torques keep their rate limits [-].
 
   /// Writes M a + h (nv).
@@ -71,7 +71,7 @@ class BackupManoeuvre {
   const JointLimits limits_;
   JointLimits slowed_;                // Limits with less acceleration.
   const double floor_, spacing_;      // Usual floor [m], and motion between two checks [m].
-  const double period_;               // [s]
+  const double period_;               // Period [s].
   StopTrajectory stop_, next_stop_;   // The known stop, from here; one from the end of this period.
   bool known_ = false, low_ = false;  // Whether a stop is known; whether a floor is below the usual one.
   Eigen::VectorXd next_q_, next_v_, next_a_, q_, next_place_, a_, force_;

@@ -43,8 +43,8 @@ class CheckedPlaces {
 
   const ClearanceQuery& body_;
   const double spacing_;           // Motion between two checks [m].
-  Eigen::MatrixXd places_;         // (nv × capacity)
-  Eigen::VectorXd distance_left_;  // (capacity) [m]
+  Eigen::MatrixXd places_;         // Configurations (nv × capacity).
+  Eigen::VectorXd distance_left_;  // Distances left there (capacity) [m].
   std::array<bool, capacity> stale_{};
   int num_ = 0;   // Places written, the newest over the oldest; above `capacity` the number counts on, to 2 * capacity.
   int last_ = 0;  // Place that served last.

@@ -6,8 +6,10 @@
 namespace sidestep {
 namespace {
 
-constexpr double rounding = 1e-9;  // relative
-constexpr int hold_of_ramp = 3;  // a fifth of the stop for each ramp: stops that accelerations bound take 1.25 times the least
+constexpr double rounding = 1e-9;  // Relative excess of a limit that counts as rounding.
+// Hold of the longer shape, in ramps: each ramp takes a fifth of the stop, so that a stop bounded by acceleration takes 1.25
+// times the shortest.
+constexpr int hold_of_ramp = 3;
 
 }  // namespace
 

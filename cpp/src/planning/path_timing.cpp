@@ -39,7 +39,7 @@ class Passes {
     }
   }
 
-  Eigen::VectorXd share;  ///< of the acceleration limits, at the stations
+  Eigen::VectorXd share;  ///< Share of the acceleration limits, at the stations.
 
   /// x at the stations.
   Eigen::VectorXd run(double begin) const {

@@ -15,7 +15,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
+constexpr double pi = 3.14159265358979323846;  // The number π.
 // Slack as a share of the margin [-]: the less slack, the more the proof of an edge along it costs.
 constexpr double slack_share = 0.25;
 constexpr double local = 0.3;        // Share of the samples that are around a node [-]: narrow places are near others.

@@ -23,8 +23,8 @@ constexpr double of_effort = 0.7, of_effort_rate = 0.5;
 constexpr double least_share = 0.05;  // Smallest share of the acceleration limits [-], where gravity takes the effort.
 // Velocity [/s] and acceleration [/s²] of joints without a limit.
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
-constexpr double stopping =  // Longest braking distance of a joint [rad | m]: beyond, no clearance can be foreseen.
-    1.5;                     // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
+// Longest braking distance of a joint [rad | m]: beyond, no clearance can be foreseen.
+constexpr double stopping = 1.5;
 
 /// p⁻¹ of ClearanceConstraints: the speed [m/s] at which a clearance with this distance left may close.
 double closing_speed(double distance_left, double A, double rate) {
@@ -132,7 +132,7 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Cl
   route.places.resize(v.size(), num);
   route.clearance = Eigen::VectorXd::Zero(num);
   Eigen::MatrixXd clearances = Eigen::MatrixXd::Zero(body.num_items(), num);
-  Eigen::VectorXd hardest(num);  // d²s/dt² of a straight path
+  Eigen::VectorXd hardest(num);  // Largest d²s/dt² of a straight path.
   Eigen::VectorXd usable = Eigen::VectorXd::Ones(num);
   double of_jerk = 1.0;
   std::optional<TorqueReserve> reserve;

@@ -17,7 +17,7 @@
 
 namespace sidestep {
 
-/// What is proven and measured of the ellipsoids that cover one link.
+/// Proof and measures of the ellipsoids that cover one link.
 struct CoverProof {
   std::string link;
   double coverage = 0.0;           ///< Share of the mesh's area proven to lie inside the ellipsoids; 1 for a cover.
@@ -37,15 +37,15 @@ struct Provenance {
   std::string date;              ///< Date of the preparation, ISO 8601.
 };
 
-/// What an arm knows besides the quantities that control needs.
+/// Details of an arm that control does not need.
 struct ArmDetails {
   std::vector<CoverProof> proof;                                   ///< One proof per covered link.
   std::vector<std::pair<std::string, std::string>> allowed_pairs;  ///< Pairs of links that may touch.
   Provenance provenance;
 };
 
-/// Everything that is prepared once for a robot: kinematic tree, limits, inertias, frames, covering body with its
-/// proof, pairs of links that must not touch, clearance tables.
+/// Model of a robot, prepared once: kinematic tree, limits, inertias, frames, covering body with its proof, pairs of links
+/// that must not touch, clearance tables.
 ///
 /// An immutable value; copies share their content. `save` and `load` use one binary file (`.arm`) that needs no mesh,
 /// no URDF and no Python.

@@ -11,8 +11,8 @@
 
 namespace sidestep {
 
-/// An object that a link holds: a tool, something grasped. It is part of the arm: it keeps off obstacles and off the links
-/// that another joint moves, and its mass counts.
+/// An object that a link holds: a tool, or something grasped. It becomes part of the arm: it avoids obstacles and the links
+/// that other joints move, and its mass counts.
 struct Attachment {
   std::string name;                                        ///< Name of its frame, which no other frame may have.
   std::string link;                                        ///< Link that holds it.
@@ -25,34 +25,37 @@ struct Attachment {
   static constexpr const char* anything = "*";  // Stands in `rests_on` for every obstacle.
 };
 
-/// The arm with an object attached: a frame, ellipsoids, pairs with every covered link that another joint moves, and its inertia
-/// with that of the link.
-/// At q (nv), where it is not empty, the object is apart from everything: a pair whose ellipsoids overlap there may stay as near as
-/// it is (LinkPair::contact), less `attached_distance` [m].
-/// Throws std::invalid_argument that names the object and what is wrong: a name that is taken, a link that is unknown or that no
-/// joint moves, no ellipsoid or one that is none, an inertia that is none.
+/// The arm with an object attached: adds a frame, ellipsoids, pairs with every covered link that another joint moves, and its
+/// inertia to that of the link.
+///
+/// At q (nv), unless empty, the object touches nothing: a pair whose ellipsoids overlap there may stay as close as it is
+/// (LinkPair::contact), less `attached_distance` [m]. Throws std::invalid_argument that names the object and what is wrong: a
+/// name that is taken, a link that is unknown or that no joint moves, no ellipsoid or an invalid one, an invalid inertia.
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = {});
 
-/// What is implausible about the place of an object that an arm holds, in words that name the distance; empty: nothing. Its cover is
-/// farther from the links that move with its link than 2.5 times their size, that is 0.3 to 0.4 m. Or it is farther than 0.15 m,
-/// and its pose, read in the world's frame, puts it to them at q (nv), where that is not empty.
+/// Doubt about the place of a held object, in words that name the distance; empty: none.
+///
+/// Its cover is farther from the links that move with its link than 2.5 times their size, that is 0.3 to 0.4 m. Or it is farther
+/// than 0.15 m, but near them at q (nv), unless empty, if its pose is read in the world's frame.
 std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q = {});
 
 // Slack of an attached object towards what it overlaps or rests on when it is attached [m].
 constexpr double attached_distance = 0.001;
 
-/// An object that stands on something, and by how much its cover has given way there.
+/// An object that stands on something, and how much its cover was cut there.
 struct RestingObject {
   Attachment object;
   /// Largest distance of the whole ellipsoid from what is left of it [m], one per ellipsoid of the cover.
   std::vector<double> given;
 };
 
-/// The object with ellipsoids cut down to smaller ones inside them, which keep `distance` [m] off the points of obstacles that it rests
-/// on. With the ellipsoid {c + A u : |u| <= 1} and a plane at w·u = β there, w a unit vector, the smaller one is
-/// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane, and the ellipsoid on the other side.
-/// Throws std::invalid_argument that names the object and an obstacle: one that there is not, that it is more than
-/// `deepest_rest` [m] deep in, or that an ellipsoid lies wholly within the distance of.
+/// The object with its ellipsoids reduced to smaller ones inside them, which keep `distance` [m] from the points of the
+/// obstacles that it rests on.
+///
+/// For the ellipsoid {c + A u : |u| <= 1} and a plane at w·u = β, w a unit vector, the smaller one is
+/// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane and, on the other side, the ellipsoid.
+/// Throws std::invalid_argument that names the object and an obstacle: an unknown one, one in which the object is more than
+/// `deepest_rest` [m] deep, or one that has a whole ellipsoid within the distance.
 RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
                       double distance);
 

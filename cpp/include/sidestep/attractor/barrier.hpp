@@ -10,10 +10,9 @@ namespace sidestep {
 
 /// An embedding whose coordinates are barriers of clearances, ψ_k = f(h_k).
 ///
-/// Every coordinate has an activation distance of its own, and whoever evaluates may ask for shorter ones
-/// (EmbeddingView::activations): where the arm has to come close, at its goal, the metric is else so steep that the
-/// pull to the goal is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is
-/// known and not seen: a link that has to come near another one can.
+/// Every coordinate has its own activation distance; the caller may shorten it (EmbeddingView::activations). Where the arm has
+/// to come close, at its goal, the metric would otherwise be so steep that the arm creeps. The safety margin (SafetySettings)
+/// shrinks along with it for clearances that no sensor sees, so that links can come as close to each other as they have to.
 class Barrier : public Embedding {
  public:
   int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }
@@ -23,7 +22,7 @@ class Barrier : public Embedding {
   /// The activation distance of every coordinate (m) [m | rad].
   const Eigen::VectorXd& activations() const noexcept { return activations_; }
 
-  /// The floor of a coordinate: the barrier function's, shorter by as much as its own activation distance is.
+  /// Floor of a coordinate: that of the barrier function, scaled with the coordinate's activation distance.
   double floor(Eigen::Index k) const noexcept { return function_.floor * activations_[k] / function_.activation; }
 
   void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept final { activations = activations_; }
@@ -44,7 +43,7 @@ class Barrier : public Embedding {
   /// Makes the activation distance of a coordinate shorter than the barrier function's.
   void shorten_activation(int k, double most) { activations_[k] = std::min(activations_[k], most); }
 
-  /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
+  /// Horizon of the critical samples: the activation distance beyond what can be closed while the arm stops.
   Horizon horizon(const KinematicState& state) const noexcept {
     return {Horizon::of_stop(state.v(), robot().limits()), function_.activation};
   }

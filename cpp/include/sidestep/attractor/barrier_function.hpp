@@ -18,7 +18,7 @@ struct BarrierFunction {
   double floor;       ///< Smallest clearance at which the formula is used.
 
   struct Value {
-    double value, first, second;  ///< ψ, dψ/dh, d²ψ/dh².
+    double value, first, second;  ///< The barrier ψ, dψ/dh, d²ψ/dh².
   };
 
   Value operator()(double h) const noexcept {

@@ -21,9 +21,8 @@ namespace sidestep {
 /// become infinite and what has clearances cannot touch. Moving obstacles enter dψ/dt and d²ψ/dt² exactly.
 class ClearanceBarrier : public Barrier {
  public:
-  /// Clearances are measured up to `reach` [m], at least to the activation distance, and what approaches as far as the arm
-  /// needs to stop, for what keeps them (MotionProgram). Throws std::invalid_argument that names the
-  /// setting at fault.
+  /// Measures clearances up to `reach` [m], at least to the activation distance, and critical samples as far as the arm needs
+  /// to stop, for the MotionProgram. Throws std::invalid_argument that names the setting at fault.
   ClearanceBarrier(const Robot& robot, std::shared_ptr<const ClearanceGroup> group, const BarrierFunction& function,
                    double reach = 0.0, const char* owner = "clearance barrier");
 

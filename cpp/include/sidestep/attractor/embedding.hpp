@@ -14,7 +14,7 @@
 
 namespace sidestep {
 
-/// Where an embedding adds its m coordinates ψ, their gradients and their curvatures.
+/// Output of an embedding: it adds its m coordinates ψ, their gradients and their curvatures.
 struct EmbeddingView {
   Eigen::Map<Eigen::VectorXd> values;               ///< Coordinates ψ (m).
   Eigen::Map<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m).
@@ -41,7 +41,7 @@ class Embedding {
   /// Adds to `out`, which the caller has zeroed. No allocation.
   virtual void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept = 0;
 
-  /// What coordinate k stands for. Allocates: to be asked at construction, not in the loop.
+  /// Label of coordinate k. Allocates: for construction, not for the loop.
   virtual CoordinateLabel label(int k) const;
 
   /// Lowers `distances` (nv) to the distance [m] between the obstacles and what each joint carries directly
@@ -49,8 +49,8 @@ class Embedding {
   virtual void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                                const Obstacles& obstacles) const noexcept;
 
-  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle; where they do not, the parts
-  /// may. Much quicker than `add_to`. False without a body. No allocation.
+  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle. If they do not, the parts still may.
+  /// Much quicker than `add_to`. False without a body. No allocation.
   virtual bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept;
 
   /// Whether `lower_distances` does anything.

@@ -18,7 +18,7 @@ namespace sidestep {
 /// Where damping acts: h = −G⁻¹ ∂U − D (v − v*) (plain, T5.4), or h = −G⁻¹ (∂U + D (v − v*)) (metric, T2.12).
 enum class DampingForm { plain, metric };
 
-/// How the goal pulls: −G⁻¹ ∂U (metric, T5.4), or held back only where a ψ rises (one_sided, see one_sided_metric.hpp).
+/// Form of the attraction: −G⁻¹ ∂U (metric, T5.4), or held back only where a ψ rises (one_sided, see one_sided_metric.hpp).
 enum class PullForm { metric, one_sided };
 
 struct GeometricSystemSettings {
@@ -31,16 +31,16 @@ struct GeometricSystemSettings {
   PullForm pull_form = PullForm::metric;
 };
 
-/// What a step of the system says about its result.
+/// Status of a step.
 enum class StepStatus {
-  ok,                   ///< the equations hold
-  outside_limits,       ///< the equations hold, but a joint is outside its position limits
-  goal_out_of_reach,    ///< the equations hold, but the frame cannot be where the goal is
-  inside_barrier,       ///< the equations hold, with a push: a clearance is below its barrier's floor
-  goal_outside_limits,  ///< the goal is outside the position limits: the equations hold without its pull
-  invalid_goal,         ///< the goal is not finite, or made for another robot: the equations hold without its pull
-  invalid_state,        ///< fallback: q or v is not finite
-  not_finite,           ///< fallback: the equations gave a value that is not finite
+  ok,                   ///< The equations hold.
+  outside_limits,       ///< The equations hold, but a joint is outside its position limits.
+  goal_out_of_reach,    ///< The equations hold, but the frame cannot reach the goal.
+  inside_barrier,       ///< The equations hold, with a push: a clearance is below its barrier's floor.
+  goal_outside_limits,  ///< The goal is outside the position limits: the equations hold without its attraction.
+  invalid_goal,         ///< The goal is not finite, or made for another robot: the equations hold without its attraction.
+  invalid_state,        ///< Fallback: q or v is not finite.
+  not_finite,           ///< Fallback: the equations gave a value that is not finite.
 };
 
 /// Whether the acceleration is the fallback, a damped stop within the acceleration limits.
@@ -73,7 +73,7 @@ class GeometricSystem {
     int inside = -1;                      ///< Coordinate deepest below its floor; -1: none.
     Eigen::VectorXd switch_weights;       ///< Weights s (nv): 1 is harmonic.
     Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m).
-    Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
+    Eigen::MatrixXd jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m).
     Clearances clearances;                ///< Clearances of the coordinates that are barriers of clearances (m).
     Eigen::VectorXd activations;          ///< Input: activation distances (m) of these, at first the system's.
     /// Input: least time τ [s] within which approaching obstacles count, see Horizon.
@@ -113,17 +113,16 @@ class GeometricSystem {
   /// miss it. No allocation.
   bool touches(ConstVectorRef q, const Obstacles& obstacles, double depth, Workspace& workspace) const noexcept;
 
-  /// Why the motion of the step that `workspace` holds is what it is, see diagnosis.hpp. No allocation.
+  /// Explains the motion of the step in `workspace`, see diagnosis.hpp. No allocation.
   Diagnosis diagnose(const Workspace& workspace) const noexcept;
 
-  /// The same, and whether a stop is because the goal itself is blocked. Takes a step at the goal too, so not for every
-  /// step of a loop. A pose may be reached in many configurations and is not examined.
+  /// The same, and whether the goal itself is blocked. Takes a step at the goal as well, so not for every step of a loop. A pose
+  /// may be reached in many configurations and is not examined.
   Diagnosis diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles,
                      Workspace& workspace) const noexcept;
 
-  /// Lowers activation distances (m) so that barriers leave a configuration (nv) [rad | m] free, see Barrier. What the
-  /// workspace says of its last step is lost. False, and nothing changes, where the configuration is not finite. No
-  /// allocation.
+  /// Lowers activation distances (m) so that barriers leave a configuration (nv) [rad | m] free, see Barrier. Overwrites the last
+  /// step in the workspace. False, and nothing changes, if the configuration is not finite. No allocation.
   [[nodiscard]] bool lower_activations(ConstVectorRef q, const Obstacles& obstacles, Workspace& workspace,
                                        Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
 

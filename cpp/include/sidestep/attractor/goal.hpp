@@ -13,13 +13,12 @@
 
 namespace sidestep {
 
-// Where the arm is drawn to. A goal is a potential U(q, t) over the joints: its gradient takes the place of K (q − q*)
-// in the damped spring,
+// A goal is a potential U(q, t) over the joints. Its gradient takes the place of K (q − q*) in the damped spring,
 //
 //     h = −G⁻¹ (∂U/∂q − a*) − D (v − v*),
 //
-// and v* is the joint velocity that follows a goal that moves, a* its rate: with them a moving goal is followed without
-// the lag that D v* and a* would cause. Goals are values, made anew or advanced as they move.
+// v* is the joint velocity that follows a moving goal, a* its rate: with them a moving goal is followed without lag. Goals
+// are values, made anew or advanced as they move.
 
 /// A configuration: U = ½ (q − q*)ᵀ K (q − q*), with the system's own stiffness K; v* = dq*/dt, a* = dv*/dt.
 struct JointGoal {
@@ -51,10 +50,9 @@ struct PoseGoalSettings {
 /// Near |φ| = π, a half turn, U has a ridge: both ways back are equally short. The gradient stays finite there, |R φ|
 /// <= π, and on the ridge one of the two ways is taken; as U falls on both sides, the motion leaves the ridge.
 ///
-/// The posture pull acts where the pose does not: ∂U is joined by N k_0 (q − q_rest) with N = I − Jᵀ (J Jᵀ + λ² I)⁻¹ J,
-/// J the Jacobian of what the goal prescribes. It is no gradient, but moves the resting pose by no more than λ²/σ² of
-/// itself, σ the least singular value of J. The joint velocity that follows a twist V* of the pose is v* = Jᵀ (J Jᵀ +
-/// λ² I)⁻¹ V*.
+/// The posture acts in the null space of the pose: N k_0 (q − q_rest) is added to ∂U, with N = I − Jᵀ (J Jᵀ + λ² I)⁻¹ J and J
+/// the Jacobian of what the goal prescribes. It is no gradient, but moves the resting pose by at most λ²/σ² of itself, σ the
+/// smallest singular value of J. The joint velocity that follows a twist V* of the pose is v* = Jᵀ (J Jᵀ + λ² I)⁻¹ V*.
 struct PoseGoal {
   /// Throws std::invalid_argument on a frame that is unknown or that no joint moves (listing the allowed ones), on a
   /// rotation that is none, and on settings out of range. Values that are not finite give a status in the loop instead.
@@ -70,7 +68,7 @@ struct PoseGoal {
   PoseGoalSettings settings;
   std::vector<PoseGoal> others;  ///< Further goals, see `add`; these have no others of their own.
 
-  /// What a goal keeps of the robot it was made for: enough to make it again where the robot is not at hand.
+  /// Data of the robot that a goal was made for: enough to make it again without the robot.
   struct MadeFor {
     Frame frame;
     std::uint64_t joints_hash = 0;
@@ -84,7 +82,7 @@ struct PoseGoal {
   const Frame& frame() const noexcept { return made_for_.frame; }
   /// Whether it was made for a robot with these joints.
   bool is_for(const Robot& robot) const noexcept { return made_for_.joints_hash == robot.joints_hash(); }
-  /// Farther than this from `shoulder` the frame cannot be: the lengths between its joints, added.
+  /// Largest distance of the frame from `shoulder` [m]: the sum of the lengths between its joints.
   double reach() const noexcept { return made_for_.reach; }
   /// The origin of the first joint that moves the frame, in the world [m].
   const Eigen::Vector3d& shoulder() const noexcept { return made_for_.shoulder; }
@@ -110,26 +108,26 @@ bool is_moving(const Goal& goal) noexcept;
 /// What is wrong with a goal.
 enum class GoalFault {
   none,
-  invalid,         ///< not finite, or made for another robot
-  outside_limits,  ///< a configuration outside the position limits, by more than rounding (1e-9)
-  out_of_reach,    ///< a position that the frame cannot have in any configuration; the equations still hold
+  invalid,         ///< Not finite, or made for another robot.
+  outside_limits,  ///< A configuration outside the position limits, by more than rounding (1e-9).
+  out_of_reach,    ///< A position that the frame cannot reach in any configuration; the equations still hold.
 };
 GoalFault check(const Goal& goal, const Robot& robot) noexcept;
 
-/// How a goal pulls at a state, and how far it is; made once.
+/// Potential of a goal at a state, its gradient, and the distance to the goal. Made once, updated in every step.
 struct GoalPotential {
   explicit GoalPotential(int nv);
 
-  /// Computes everything but for a goal with a fault that makes it unusable. No allocation.
+  /// Computes everything; not for a goal with a fault that makes it unusable. No allocation.
   void update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept;
 
-  /// No goal: nothing pulls, and damping brings the arm to rest where it is. No allocation.
+  /// No goal: the gradient is zero, and damping brings the arm to rest where it is. No allocation.
   void release() noexcept;
 
   double potential = 0.0;    ///< U, without the posture.
   Eigen::VectorXd gradient;  ///< Gradient ∂U/∂q − a* (nv), posture included.
   Eigen::VectorXd velocity;  ///< Desired velocity v* (nv).
-  // How far the goal is, the farthest of its frames; NaN where the goal has no such part.
+  // Distance to the goal, of its farthest frame; NaN if the goal has no such part.
   double joint_error = nan;     ///< Largest |q − q*| [rad | m].
   double position_error = nan;  ///< Distance |p − p*| [m].
   double rotation_error = nan;  ///< Angle |φ| [rad], at most π.

@@ -15,7 +15,7 @@ namespace sidestep {
 /// of the controller hold the limits; this one makes the motion bend before it comes to that.
 class JointLimitBarrier final : public Barrier {
  public:
-  static constexpr double range_share = 0.05;
+  static constexpr double range_share = 0.05;  // Longest activation distance of a prismatic joint, as a share of its range [-].
 
   /// Throws std::invalid_argument that names the setting, or if the robot has no finite position limit.
   JointLimitBarrier(const Robot& robot, BarrierFunction barrier);

@@ -29,12 +29,12 @@ const std::vector<Field<LocalMinimumSettings>>& fields();
 /// Leads an arm out of local minima without a map: when it is stuck, it follows a random configuration for a while,
 /// then its goal again, as the random walks of Barraquand and Latombe (1991) do for potential fields.
 ///
-/// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether
-/// it arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system,
-/// so nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first
-/// ones near: most dead ends are shallow, and out of the others only a long way leads. An arm within
-/// 0.01 [rad | m] of its goal has arrived and is not stuck. With a goal that from one call to the next is more than
-/// 0.2 [rad | m] elsewhere all begins anew: patience, and the first sub-goal; one that is being followed is given up.
+/// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so whether it arrives
+/// depends on where it starts. A sub-goal gives it another start. The motion to a sub-goal is one of the same system, so
+/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits. The first ones
+/// are near, since most dead ends are shallow; the others need a long way out. An arm within 0.01 [rad | m] of its goal has
+/// arrived and is not stuck. If the goal jumps by more than 0.2 [rad | m] from one call to the next, everything starts anew:
+/// the patience and the sub-goals.
 class LocalMinimumRecovery {
  public:
   explicit LocalMinimumRecovery(const Robot& robot, LocalMinimumSettings settings = {});

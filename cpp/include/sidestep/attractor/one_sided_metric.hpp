@@ -16,7 +16,7 @@ namespace sidestep {
 ///
 /// the solution of a strictly convex problem, hence continuous in x and J. With S = {k : J_k·a > 0} it is G_S⁻¹ x for
 /// G_S = I + Σ_S J_kᵀ J_k. It vanishes next to a rigid obstacle only where −x is in the cone of the J_k: at a local
-/// minimum of the potential on the free set, if x is its pull.
+/// minimum of the potential on the free set, if x is its negative gradient.
 class OneSidedMetric {
  public:
   OneSidedMetric(int nv, int m);

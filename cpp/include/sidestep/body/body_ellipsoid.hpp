@@ -14,7 +14,7 @@ struct BodyEllipsoid {
   int joint;
   int component;  ///< Index of the component of the body.
   Eigen::Vector3d mean;
-  Eigen::Matrix3d shape;  ///< level · covariance [m²].
+  Eigen::Matrix3d shape;  ///< Shape matrix, level · covariance [m²].
   double extent;          ///< Longest semi-axis [m]: radius of a ball around it.
 };
 

@@ -70,7 +70,7 @@ class ClearanceField final : public ClearanceGroup {
   };
   /// Consecutive ellipsoids of one link, with a ball around them in the frame of its child.
   struct Cluster {
-    static constexpr int most = 16;
+    static constexpr int most = 16;  // Most ellipsoids of a cluster.
 
     int first, size;
     Eigen::Vector3d centre;

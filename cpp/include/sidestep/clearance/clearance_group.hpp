@@ -20,24 +20,24 @@ class ClearanceGroup {
   virtual ~ClearanceGroup() = default;
 
   virtual int size() const noexcept = 0;
-  /// What clearance k is of, without a floor. Allocates: to be asked at construction, not in the loop.
+  /// Label of clearance k, without a floor. Allocates: for construction, not for the loop.
   virtual CoordinateLabel label(int k) const = 0;
 
-  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches within
-  /// the horizon. No allocation.
+  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and the critical samples
+  /// within the horizon. No allocation.
   virtual void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                         ClearanceView out) const noexcept = 0;
 
-  /// Longest activation distance that makes sense for clearance k [m]. Two links that usually are nearer than 11 mm have one
-  /// of nine tenths of what is usual: one that they cannot leave would hold them to no purpose, as of a wrist whose parts
-  /// pass 4 mm apart all the way round.
+  /// Longest activation distance that makes sense for clearance k [m]. Link pairs that are always close use a shorter one: nine
+  /// tenths of the usual clearance if that is below 11 mm. A longer one would always be active and hold the links to no
+  /// purpose, as for a wrist whose parts pass 4 mm apart all the way round.
   virtual double longest_activation(int /*k*/) const noexcept { return std::numeric_limits<double>::infinity(); }
 
   /// Whether the clearances are from points that a sensor sees, with errors that the safety margin covers.
   virtual bool is_seen() const noexcept { return false; }
 
-  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle; where they do not, the parts
-  /// may. Much quicker than `evaluate`. No allocation.
+  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle. If they do not, the parts still may.
+  /// Much quicker than `evaluate`. No allocation.
   virtual bool touches(const KinematicState& /*state*/, const Obstacles& /*obstacles*/, double /*depth*/) const noexcept {
     return false;
   }

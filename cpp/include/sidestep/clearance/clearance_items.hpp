@@ -19,7 +19,7 @@
 
 namespace sidestep {
 
-/// What must keep apart: a link and the obstacles, two links, a link and a plane, what a joint holds and its effort limit.
+/// One clearance: of a link and the obstacles, of two links, of a link and a plane, or of a gravity torque and its limit.
 struct ClearanceItem {
   enum class Source { obstacles, pair, plane, table, load };
 
@@ -32,23 +32,23 @@ struct ClearanceItem {
   int base = -1;              ///< Joint that moves both links of a pair alike; -1: none.
   double contact = 0.0;       ///< Contact gap of a pair [m].
 
-  /// R of every coordinate: the farthest that a point of the item moves, relative to what it keeps off, for a unit of it
-  /// (nv) [m/rad | 1]; of a table and a load the steepest slopes.
+  /// R of every coordinate (nv) [m/rad | 1]: largest relative motion of a point of the item per unit of the coordinate; for a
+  /// table and a load the steepest slopes.
   Eigen::VectorXd reach;
   /// R of the later one of two coordinates (nv × nv) [m/rad²].
   Eigen::MatrixXd bend;
-  /// Largest margin that is kept: of links that are usually near, and of loads, see ClearanceGroup [m].
+  /// Largest margin [m], for links that are usually near and for loads, see ClearanceGroup.
   double most_margin = std::numeric_limits<double>::infinity();
 
-  /// Whether it is of the arm alone, and known: no sensor's error is in it.
+  /// Whether it concerns the arm alone, so that no sensor error is in it.
   bool is_own() const noexcept {
     return label.kind == CoordinateLabel::Kind::self || label.kind == CoordinateLabel::Kind::effort;
   }
 };
 
-/// All that must keep apart of an arm, made once: the list for searches, and the groups for derivatives, over the same links.
+/// All clearances of an arm, made once: a list for searches, and groups for derivatives, over the same links.
 ///
-/// Barriers, planner, look along a motion and stop share it. Obstacles' items come first, then pairs, planes, tables and loads.
+/// Barriers, planner, look-ahead and stops share it. Items of obstacles come first, then pairs, planes, tables and loads.
 class ClearanceItems {
  public:
   /// `temperature` [m] of the means that have derivatives. Throws std::invalid_argument if the body is not calibrated or no

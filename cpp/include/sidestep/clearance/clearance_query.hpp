@@ -16,29 +16,28 @@
 
 namespace sidestep {
 
-/// How near an arm is to all that it must keep apart from, see ClearanceItems, in three forms:
+/// Clearances of an arm, see ClearanceItems, in three forms:
 ///
 ///   nearest           at a configuration, by positions alone: `nearest`, `clearances`, `distance_left`, `free`;
 ///   along an edge     everywhere between two configurations: `edge_free`;
 ///   with derivatives  at a state, for barriers: ClearanceGroup::evaluate of a group of `items()`.
 ///
-/// The first two agree with the third but for the clearance of obstacles, which is the distance of their balls from the ellipsoids,
-/// signed, by two steps of Newton towards the nearest place: a lower bound, as a supporting plane gives it.
+/// The first two agree with the third except for obstacles. There they give the signed distance of the obstacles' balls from the
+/// ellipsoids, by two Newton steps towards the nearest place: a lower bound, from a supporting plane.
 ///
 /// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther
 /// than
 ///
 ///     motion(s Δq) = s Σ_i |Δq_i| R_i      and      s v + s²/2 Σ_i Σ_j |Δq_i| |Δq_j| R_max(i, j),
 ///
-/// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where
-/// the motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with the steepest slopes for R;
-/// of what a joint holds both, with its slope along the edge for v and bounds of the derivatives. An interval of an edge is
-/// free as far around its middle as the clearance there exceeds the smaller of the two; what is left to either side is
-/// checked in the same way.
+/// R_i is the largest distance of the item from the axis of joint i, v the speed of its fastest point where the motion begins,
+/// and |∂²x/∂q_i∂q_j| ≤ R_j of the later joint. A table uses the first bound, with its steepest slopes for R. A load uses both,
+/// with its slope along the edge for v and bounds of its derivatives. An interval of an edge is free around its middle as far
+/// as the clearance there exceeds the smaller bound; the rest on either side is checked in the same way.
 class ClearanceQuery {
  public:
   explicit ClearanceQuery(std::shared_ptr<const ClearanceItems> items);
-  /// Of items of its own, see ClearanceItems.
+  /// Makes items of its own, see ClearanceItems.
   ClearanceQuery(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                  const std::vector<KeptPlane>& planes = {}, std::vector<PairDistanceTable> tables = {},
                  std::optional<GravityTorqueLimit> gravity_torque = std::nullopt)
@@ -48,17 +47,17 @@ class ClearanceQuery {
   const Robot& robot() const noexcept { return items_->robot(); }
   const ClearanceItems& items() const noexcept { return *items_; }
   int num_items() const noexcept { return items_->size(); }
-  /// What an item is: kind, link, and the other link.
+  /// Label of an item: kind, link, and the other link.
   const CoordinateLabel& label(int item) const noexcept { return (*items_)[item].label; }
 
-  /// What changes in a query; one per thread.
+  /// Memory of a query; one per thread.
   class Workspace {
    public:
     explicit Workspace(const ClearanceQuery& body);
 
-    /// How many clearances of single items were asked for: the work done, the same on every machine.
+    /// Number of clearances of single items computed so far: the work done, the same on every machine.
     std::int64_t checks() const noexcept { return checks_; }
-    /// Begins anew, so that what is asked for next takes the same work whatever was before.
+    /// Starts anew, so that the next query takes the same work whatever was before.
     void reset() noexcept {
       checks_ = 0;
       last_ = 0;
@@ -80,12 +79,12 @@ class ClearanceQuery {
     std::vector<Interval> intervals_;
     std::vector<std::uint64_t> open_;       // Items still undecided on an interval, one bit each: `words()` of each interval.
     Eigen::VectorXd motions_, curvatures_;  // Motions and curvatures of the items along an edge.
-    Eigen::VectorXd lengths_, products_;    // |Δq_i|, |Δq_i| |Δq_j|
+    Eigen::VectorXd lengths_, products_;    // Lengths |Δq_i|, and products |Δq_i| |Δq_j|.
     DistanceField field_;
     std::vector<double> bounds_;  // Bounds of the ellipsoids of a link.
     Eigen::VectorXd q_, difference_;
     Eigen::VectorXd placed_;  // Configuration of the placed body.
-    KinematicState state_;    // there, once it is asked for
+    KinematicState state_;    // State of the body there, computed on demand.
     Eigen::VectorXd rest_, gradient_;
     bool state_is_old_ = true;
     std::int64_t checks_ = 0;
@@ -110,22 +109,22 @@ class ClearanceQuery {
   void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
-  /// The least of what the clearances have beyond `floors` (num_items), not above `cap` [m]; where it is more than `near`, a lower
-  /// bound. Any of what joints hold counts as far. Ends below zero.
+  /// Smallest distance of the clearances above their `floors` (num_items), not above `cap` [m]; a lower bound where it exceeds
+  /// `near`. Loads do not count. The search ends at the first below zero.
   double distance_left(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
                        Workspace& w) const noexcept;
 
-  /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls
-  /// around the links; infinity where all are at rest.
+  /// Lower bound [m] of the distance to moving obstacles, now or after `time` [s] at their speed, by balls around the links;
+  /// infinity if all are at rest.
   double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept;
 
-  /// What `margins` ask of an item away from the ends [m].
+  /// Margin of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
     const ClearanceItem& of = (*items_)[item];
     return of.is_own() ? std::min({margins.pair_margin, margins.margin, of.most_margin}) : margins.margin;
   }
 
-  /// What `margins` give an item between the configurations that are looked at [m].
+  /// Slack of an item between checked configurations [m].
   double slack(int item, const Margins& margins) const noexcept {
     return std::min(margins.slack, 0.5 * (*items_)[item].most_margin);
   }
@@ -137,7 +136,7 @@ class ClearanceQuery {
   bool edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
                  Workspace& w) const noexcept;
 
-  /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
+  /// Bound of the relative motion of a point of `item` for a displacement of the joints [m].
   double motion(int item, ConstVectorRef displacement) const noexcept {
     return (*items_)[item].reach.dot(displacement.cwiseAbs());
   }
@@ -161,7 +160,7 @@ class ClearanceQuery {
   const KinematicState& state(Workspace& w) const noexcept;
   void bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
-  // How exact a clearance must be: not above `cap`, a lower bound from `near` on, and any that is below `stop`.
+  // Required accuracy: values up to `cap`, a lower bound above `near`, and any value below `stop` ends the search.
   struct Asked {
     double cap, near, stop;
   };
@@ -174,7 +173,7 @@ class ClearanceQuery {
 
   std::shared_ptr<const ClearanceItems> items_;
   struct Rotation {
-    Eigen::Matrix3d fixed, cosine, sine;  // as in KinematicState
+    Eigen::Matrix3d fixed, cosine, sine;  // Parts of the rotation, as in KinematicState.
   };
   std::vector<Rotation> rotations_;
 };

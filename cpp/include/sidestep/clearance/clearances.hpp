@@ -5,15 +5,15 @@
 
 namespace sidestep {
 
-/// Where a clearance is and goes, one entry per coordinate.
+/// Clearances with their derivatives, one entry per coordinate.
 struct ClearanceStateView {
   Eigen::Map<Eigen::VectorXd> values;      ///< Clearances h (m) [m], signed.
-  Eigen::Map<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included.
-  Eigen::Map<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²].
-  Eigen::Map<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad].
+  Eigen::Map<Eigen::VectorXd> rates;       ///< Rates dh/dt (m) [m/s], obstacle velocities included.
+  Eigen::Map<Eigen::VectorXd> curvatures;  ///< Curvatures d²h/dt² at q̈ = 0 (m) [m/s²].
+  Eigen::Map<Eigen::MatrixXd> gradients;   ///< Gradients ∂h/∂q as columns (nv × m) [m/rad].
 };
 
-/// Where an embedding that is a barrier of clearances writes them.
+/// Output of a barrier for its clearances.
 struct ClearanceView : ClearanceStateView {
   Eigen::Map<Eigen::VectorXi> nearest;  ///< Nearest point (m); beyond the reach the one that approaches; -1: neither.
   Eigen::Map<Eigen::VectorXd> margins;  ///< Largest margin (m) that ClearanceConstraints keep [m].
@@ -21,7 +21,7 @@ struct ClearanceView : ClearanceStateView {
   Eigen::Map<Eigen::VectorXd> least;    ///< Smallest clearance (m) of those that h is the mean of [m]; +inf: beyond the reach.
 };
 
-/// The memory that such views show.
+/// Memory of such views.
 struct ClearanceState {
   ClearanceState(int nv, int num)
       : values(Eigen::VectorXd::Constant(num, std::numeric_limits<double>::infinity())),
@@ -40,7 +40,7 @@ struct ClearanceState {
   Eigen::MatrixXd gradients;
 };
 
-/// The clearances, +inf beyond the reach, and what approaches. Where `nearest` is -1 the other entries have no meaning.
+/// Clearances, +inf beyond the reach, and their critical samples. Where `nearest` is -1 the other entries have no meaning.
 struct Clearances : ClearanceState {
   Clearances(int nv, int num)
       : ClearanceState(nv, num),
@@ -55,7 +55,7 @@ struct Clearances : ClearanceState {
     nearest.setConstant(-1);
     least.setConstant(std::numeric_limits<double>::infinity());
   }
-  /// Lets what is nearest be what approaches, and the least of itself.
+  /// Makes the nearest sample the critical and the smallest one.
   void mind_nearest() {
     approach = *this;
     least = values;
@@ -72,7 +72,7 @@ struct Clearances : ClearanceState {
   Eigen::VectorXi nearest;
   Eigen::VectorXd margins;
   ClearanceState approach;
-  /// (m) never above `values`, which are smooth: what is touched has less than zero here. +inf of what is no clearance from anything.
+  /// Smallest clearances (m), never above the smooth `values`: below zero in contact. +inf for a coordinate that is no clearance.
   Eigen::VectorXd least;
 };
 

@@ -5,15 +5,15 @@
 
 namespace sidestep {
 
-/// What a clearance, or another coordinate of an embedding, is of. Fixed at construction, for messages and for what acts on clearances.
+/// Label of a clearance, or of another coordinate of an embedding. Fixed at construction.
 struct CoordinateLabel {
   enum class Kind {
-    potential,    ///< no clearance: a density, a sum
-    obstacle,     ///< a link, or one ellipsoid of it, against the obstacle points
-    self,         ///< two links of the robot
-    plane,        ///< a link against a plane
-    joint_limit,  ///< a joint against a position limit; the clearance is in the joint's unit
-    effort,       ///< what a joint holds of the arm against its effort limit, see GravityTorqueLimit
+    potential,    ///< No clearance: a density, a sum.
+    obstacle,     ///< A link, or one ellipsoid of it, against the obstacle points.
+    self,         ///< Two links of the robot.
+    plane,        ///< A link against a plane.
+    joint_limit,  ///< A joint against a position limit; the clearance is in the joint's unit.
+    effort,       ///< The gravity torque of a joint against its effort limit, see GravityTorqueLimit.
   };
   Kind kind = Kind::potential;
   std::string name = {};                                    ///< Name of the link, or of the coordinate for limits.

@@ -9,24 +9,23 @@
 
 namespace sidestep {
 
-/// How far places are from the nearest obstacle ball, remembered on grids that are filled where they are asked.
+/// Cache of distances to the nearest obstacle ball, on grids that are filled on demand.
 ///
 /// A cell keeps the distance d of its centre c. As a distance changes no faster than the place,
 ///
 ///     distance(x) ≥ d(c) − |x − c|,
 ///
-/// which costs a look-up once somebody has asked near x. There are coarse cells for what is far away and fine ones for
-/// what is near, in blocks under a hash of their place, so that no workspace has to be stated. One per thread.
+/// which costs one look-up after an earlier query near x. Coarse cells serve far obstacles, fine ones near obstacles. Blocks
+/// are hashed by their place, so that no workspace has to be stated. One per thread.
 class DistanceField {
  public:
   DistanceField();
 
-  /// Among these obstacles from now on; forgets the others unless they are the same, see Obstacles::version().
+  /// Selects the obstacles; keeps the cache if they are the same, see Obstacles::version().
   void follow(const Obstacles& obstacles) noexcept;
 
-  /// A lower bound of the distance of x [m] from the obstacles that `follow` was told of, which must be as they were.
-  /// One that is `enough`, or else the best that cells give: the distance less the diagonal of a fine one, 7 cm, at
-  /// most.
+  /// Lower bound of the distance of x [m] from the obstacles of `follow`, which must not have changed. It is at least `enough`,
+  /// or the best that the cells give: lower than the distance by at most the diagonal of a fine cell, 7 cm.
   double bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept;
 
  private:

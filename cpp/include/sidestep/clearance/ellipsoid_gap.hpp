@@ -22,7 +22,7 @@ namespace sidestep {
 ///
 ///     h' = φ',   h'' = φ'' + gᵀ (−∂²φ)⁻¹ g,   g = (∂φ)' across n.
 struct EllipsoidGap {
-  double value, rate, curvature;  ///< h [m], h', and h'' at q̈ = 0.
+  double value, rate, curvature;  ///< Gap h [m], h', and h'' at q̈ = 0.
   Eigen::Vector3d normal;         ///< Unit normal n, from a to b.
   Eigen::Vector3d contact;        ///< Point of b nearest to a [m]: if b moves by v there, the gap grows by n·v.
 };

@@ -7,20 +7,20 @@
 
 namespace sidestep {
 
-/// Which configurations an arm can rest in: where the torque that holds it against gravity is within the effort limits.
+/// Clearance between gravity torque and effort limit: the arm can rest where it is positive.
 ///
 ///     h_j(q) = (effort_j − |g_j(q)|) / weight_j  [m],
 ///
-/// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a prismatic joint it is a share of
-/// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below. It is no clearance from
-/// anything, so that Clearances::least says nothing of it.
+/// with the weight of all that joint j carries: how much farther out their centre of mass may be. (For a prismatic joint it is a
+/// share of that weight.) Where h_j is negative, no controller can hold the arm, and it sinks. It is no distance to an object,
+/// so Clearances::least does not contain it.
 class GravityTorqueLimit final : public ClearanceGroup {
  public:
-  /// Of the joints that may come nearer to their limit than an activation distance of `most` [m] in any configuration; of the others
-  /// none can. `effort` (nv) [Nm | N] may be infinite.
+  /// Contains the joints that can come closer to their limit than an activation distance of `most` [m] in some configuration.
+  /// `effort` (nv) [Nm | N] may be infinite.
   GravityTorqueLimit(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most);
 
-  /// What a joint holds, or several that share a coordinate.
+  /// Load of a joint, or of several that share a coordinate.
   struct Load {
     struct Carrier {
       int joint;

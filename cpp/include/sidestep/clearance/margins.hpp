@@ -5,10 +5,10 @@
 
 namespace sidestep {
 
-/// How far every item (see ClearanceQuery) must keep off at a configuration.
+/// Clearance that every item (see ClearanceQuery) must keep at a configuration.
 ///
-/// The margin is asked for at every configuration that is looked at, margin − slack is kept everywhere between them.
-/// Near an end of the motion where an item is nearer than the margin, by the deficit δ, it may be as near:
+/// The margin holds at every checked configuration, margin − slack everywhere in between. Near an end of the motion where an
+/// item is closer than the margin by the deficit δ, it may stay that close:
 ///
 ///     margin(q) = margin − max over ends of δ_end · max(0, 1 − motion(q − q_end) / fade),
 ///

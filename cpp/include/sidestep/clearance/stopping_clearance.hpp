@@ -9,11 +9,11 @@
 
 namespace sidestep {
 
-/// How far ahead what approaches is looked for.
+/// Horizon of the critical sample.
 ///
-/// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a
-/// clearance of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is
-/// smallest is the critical sample: not always the nearest, past which the arm may move.
+/// An arm that stops along its path in the time 2τ, with closing speeds that fall linearly, stops at a clearance of h + τ h'
+/// from points that it approaches in a straight line, and at more from points that it passes. The critical sample is the one
+/// of the smallest h + τ h'. It is not always the nearest, past which the arm may move.
 struct Horizon {
   double time = 0.0;                                           ///< Time τ of the stop [s].
   double distance = -std::numeric_limits<double>::infinity();  ///< Largest h + τ h' at which a sample counts [m].
@@ -32,9 +32,8 @@ struct Horizon {
     return std::min(time, longest);
   }
 
-  /// The speed at which what moves with v may close in on what is seen at x from it, at most: n·v, where the unit
-  /// vector n goes from somewhere in a ball to somewhere x away in it. Given along = x·v, |x|, the ball's radius and
-  /// |v|.
+  /// Largest closing speed n·v of a ball that moves with v, towards a point at x from its centre: the unit vector n goes from
+  /// any place in the ball to that point. Arguments: along = x·v, |x|, the radius of the ball, and |v|.
   static double closing_speed(double along, double distance, double radius, double speed) noexcept {
     const double sine = radius / distance, component = along / distance;
     const double cosine = std::sqrt(std::max(0.0, 1.0 - sine * sine));

@@ -8,14 +8,13 @@
 
 namespace sidestep {
 
-/// Clearances that tables hold, one each: of links with two joints between them.
+/// Clearances of links with two joints in between, one table each.
 ///
-/// Such links are always close to each other, and ellipsoids too coarse: a table is exact, and faster.
+/// Such links are always close, and ellipsoids are too coarse for them. A table is exact, and faster.
 ///
-/// What approaches is the tangent of h somewhere on the way that the arm takes to stop, τ ahead (see Horizon): that
-/// which comes to the least, h + (τ − t) h' at the time t. So behind a crest the far slope counts before it is reached;
-/// where h is convex the tangent is that of here. Where it is least h turns convex, or the arm has stopped, so that
-/// what is less than 0 of its curvature is left out.
+/// The critical sample is a tangent of h on the way that the arm takes to stop, τ ahead (see Horizon): the one with the
+/// smallest h + (τ − t) h' at a time t. So behind a crest the far slope counts before it is reached; where h is convex, it is
+/// the present tangent. At the minimum h turns convex or the arm has stopped, so a negative curvature is left out.
 class TableClearances final : public ClearanceGroup {
  public:
   /// Throws std::invalid_argument, which `owner` begins, if there is no table; or if a link is unknown or a table at fault,

@@ -50,7 +50,7 @@ struct ScalarLimits {
   double lower, upper, velocity, acceleration;
 };
 
-// How the bounds come about, for one joint and its upper limit u (the lower one is the mirror image).
+// Derivation of the bounds, for one joint and its upper limit u (the lower one is the mirror image).
 //
 // The acceleration a is held for one period T, after which the velocity is w = v + aT.
 //
@@ -72,28 +72,28 @@ struct ScalarLimits {
 //     q + vT + c (w - v) T + D(w) <= u,      c = 1/2 when braking (w < v), 1 when not.
 // The left side increases with w and is piecewise linear, so the largest such w is a closed form.
 //
-// Outside the limit that inequality wants the whole way back within one period. It is enough, and gentler, to come
-// back with the speed from which the same distance could be braked: w = -D^-1(excess), which reaches the limit in
-// finite time and at rest. The velocity limit always stands above this, and the acceleration limit above everything:
-// where no admissible acceleration exists the bounds collapse to full braking (or full steering back).
+// Outside the limit that inequality would require the whole way back within one period. It is enough, and gentler, to
+// return with the speed from which the same distance could be braked: w = -D^-1(excess), which reaches the limit in finite
+// time and at rest. The velocity limit always ranks above this, and the acceleration limit above everything: if no
+// admissible acceleration exists, the bounds collapse to full braking (or full return).
 //
 // With a jerk limit J. The acceleration x of the next period is within JT of that of the last one, a, and must leave time to
-// be taken back: the smooth way to brake reduces it by J to -A, holds that, and ends at rest without acceleration. Held
-// accelerations that are the means of such a profile over whole periods keep A, and J between one and the next. After x the
-// profile goes on from v + xT with the acceleration x - JT/2 at that moment (its mean over the next period is then not below
-// x - JT), so that x is viable if
+// be reduced: smooth braking reduces it by J to -A, holds that, and ends at rest without acceleration. Held accelerations that
+// are the means of such a profile over whole periods keep A, and J from one to the next. After x the profile continues from
+// v + xT with the acceleration x - JT/2 at that moment (its mean over the next period is then not below x - JT). So x is
+// viable if
 //     v + xT + (x - JT/2)²/2J <= V                  (for x > JT/2; else v + xT <= V)
 //     q + max(v + xT, v + xT/2) T + S(v + xT, max(x - JT/2, -A)) + wT/2 <= u,
-// S(v, a) the way of the profile, in closed form: see jerk_braking_distance; w its largest speed, or 0: its end falls between
-// two samples. Both sides rise with x. Following the profile
-// keeps them true, so that such an x exists in the next period again. Where none does (a state that was not reached this way)
-// jerk gives way, as little as it takes, never a limit above.
+// with S(v, a) the distance of the profile in closed form, see jerk_braking_distance, and w its largest speed, or 0: its end
+// falls between two samples. Both sides rise with x. Following the profile keeps both true, so such an x exists in the next
+// period again. If none exists (the state was not reached this way), jerk gives way, as little as possible, and never a limit
+// above.
 
 /// Distance D(speed) [rad | m] covered while braking from `speed` >= 0 to rest in whole periods.
 double braking_distance(double speed, double acceleration, double period) noexcept;
 
 /// Distance S [rad | m] covered until rest from a speed v [/s], any sign, and an acceleration a >= -A [/s^2], braking as hard
-/// as A and the jerk J allow and ending without acceleration; at most 0 where the way ahead is none.
+/// as A and the jerk J allow and ending without acceleration; at most 0 if the joint does not advance.
 double jerk_braking_distance(double v, double a, double acceleration, double jerk) noexcept;
 
 /// Whether a joint can be kept inside its limits for ever from this state, up to `tolerance` [rad | m, and /s].
@@ -109,9 +109,9 @@ struct ReturnableAcceleration {
   bool by_velocity = false, by_position = false;
 };
 
-/// The largest acceleration from `least` to `largest` that can be taken back by `jerk` [/s^3] in time for the upper velocity limit and
-/// an upper position limit that is `distance_left` away, at the velocity `speed`; see the derivation above. `least` where none fits,
-/// less than that where the velocity limit requires it.
+/// The largest acceleration in [least, largest] that `jerk` [/s^3] can reduce in time for the upper velocity limit and for an
+/// upper position limit at `distance_left`, at the velocity `speed`; see the derivation above. `least` if none fits, less if the
+/// velocity limit requires it.
 ReturnableAcceleration largest_returnable(double distance_left, double speed, double least, double largest,
                                           const ScalarLimits& limits, double jerk, double period) noexcept;
 

@@ -7,19 +7,19 @@
 
 namespace sidestep {
 
-/// How hard the arm can brake, by the limits of its accelerations and torques. Memory is taken at construction.
+/// Braking ability of the arm within its acceleration and torque limits. Memory is allocated at construction.
 class BrakingLimits {
  public:
   BrakingLimits(int num_coordinates, int max_rows);
 
   /// τ [s]: duration of a stop along the path, −v/τ, within the limits; see clearance_demand.hpp.
   double stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept;
-  /// Takes the mass matrix and the torques, and the gradients (nv) of `size` rows from `first` on: column `of[row]` each.
+  /// Takes the dynamics, and the gradients (nv) of `size` rows from `first` on: column `of[row]` each.
   void update(int first, int size, const std::vector<int>& of, const Eigen::MatrixXd& gradients, const JointLimits& limits,
               const BrakingTorque& torque) noexcept;
   /// (M⁻¹∇h)·(torque − bias) at the effort limits, of a row that `update` took.
   double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
-  /// max direction·a with the acceleration in a box and M a in another, by default what effort leaves of it; `otherwise` where
+  /// max direction·a with the acceleration in one box and M a in another, by default that of the effort limits; `otherwise` if
   /// there is no such a.
   double largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                          const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper, double otherwise) noexcept;

@@ -77,10 +77,10 @@ class ClearanceConstraints : public Constraint {
   void add(const Clearances& clearances, const BrakingState& state, RowBlock& rows) noexcept;
 
   const SafetySettings& settings() const noexcept { return settings_; }
-  const std::vector<int>& coordinates() const noexcept {
-    return coordinates_;
-  }                                                                      ///< Clearance of each row, most critical first.
-  const std::vector<int>& nearest() const noexcept { return nearest_; }  ///< Nearest obstacle point of each row.
+  /// Clearance of each row, most critical first.
+  const std::vector<int>& coordinates() const noexcept { return coordinates_; }
+  /// Nearest obstacle point of each row.
+  const std::vector<int>& nearest() const noexcept { return nearest_; }
   /// Whether each row requires a stop along the path.
   const std::vector<char>& along_path() const noexcept { return along_path_; }
 
@@ -130,10 +130,10 @@ class ClearanceConstraints : public Constraint {
   JointLimits limits_;
   SafetySettings settings_;
   bool effort_is_limited_;
-  std::vector<int> coordinates_, nearest_;   // (max)
-  std::vector<char> along_path_;             // (max)
-  std::vector<Reserve> reserves_;            // (max)
-  Eigen::VectorXd asked_;                    // (max) before relax_to_braking
+  std::vector<int> coordinates_, nearest_;   // Clearance and nearest point of each row (max).
+  std::vector<char> along_path_;             // Whether each row requires a stop along the path (max).
+  std::vector<Reserve> reserves_;            // Reserve of each row (max).
+  Eigen::VectorXd asked_;                    // Bounds before relax_to_braking (max).
   Eigen::VectorXd urgency_;                  // Predicted distances left of the chosen rows (max) [m], ascending.
   Eigen::VectorXd least_;                    // −(acceleration limits) (nv).
   Eigen::VectorXd next_lower_, next_upper_;  // Accelerations that the jerk limits allow next (nv) [/s²].

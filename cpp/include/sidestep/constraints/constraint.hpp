@@ -10,7 +10,7 @@
 
 namespace sidestep {
 
-/// What the last period's command was, where jerk and torque rate are to keep their limits; null leaves a limit out.
+/// Command of the last period, for the limits of jerk and torque rate; null: the limit does not apply.
 struct LastCommand {
   const Eigen::VectorXd* acceleration = nullptr;  ///< Acceleration (nv) [/s^2].
   const Eigen::VectorXd* torque = nullptr;        ///< Torque (nv) [Nm | N].
@@ -28,8 +28,8 @@ struct LastCommand {
   const Eigen::VectorXd* decided = nullptr;
 };
 
-/// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
-/// solved for.
+/// Clearances at a second state, which bound the same acceleration: those of the arm itself if the program is solved for its
+/// reference.
 struct SecondState {
   const Clearances* clearances = nullptr;  ///< Clearances there; null: none.
   const Eigen::VectorXd* velocity = nullptr;
@@ -49,7 +49,7 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
-/// What is violated already, before any row is written.
+/// Violations found before any row is written.
 struct Survey {
   double least_clearance = std::numeric_limits<double>::infinity();  ///< Smallest clearance [m].
   int least_coordinate = -1, least_nearest = -1;
@@ -76,8 +76,8 @@ struct Moment {
 
 /// A bound on the acceleration of the next period. One subclass, one file; see docs/how-to/add-a-constraint.md.
 ///
-/// Everything but the constructor is noexcept and allocates nothing. The program calls, in each solve and of all constraints in
-/// the order of its list: `usable`, `survey`, `append`; where not all can be kept, those below; at the end `report`.
+/// All methods are noexcept and allocate nothing. In each solve the program calls `usable`, `survey` and `append` of all
+/// constraints in the order of its list. If not all can be kept, it calls `widen` to `defer_recovery`; at the end `report`.
 class Constraint {
  public:
   virtual ~Constraint() = default;
@@ -91,25 +91,25 @@ class Constraint {
 
   /// Whether its input is finite and of the right size. Otherwise the arm is stopped within all other constraints.
   virtual bool usable(const Moment&) const noexcept { return true; }
-  /// Says what is violated already.
+  /// Reports violations of the present state.
   virtual void survey(const Moment&, Survey&) const noexcept {}
-  /// Whether the damped stop keeps it too, for which the state alone is known.
+  /// Whether the damped stop keeps it too, which knows the state alone.
   virtual bool bounds_stop() const noexcept { return false; }
 
-  /// Writes `bounds.wide`, within which the acceleration stays after jerk or comfort gave way.
+  /// Writes `bounds.wide`: bounds of the acceleration after jerk or comfort gave way.
   virtual void widen(Priority /*given_up*/, const Moment&, Bounds&) const noexcept {}
-  /// Weakens its rows to the least that keeps the current stop feasible, so that jerk need not give way. False: nothing to weaken.
+  /// Weakens its rows to the least that keeps the current stop feasible, before jerk gives way. False: nothing to weaken.
   virtual bool relax_to_braking(const Moment&, RowBlock&) noexcept { return false; }
   /// Undoes relax_to_braking.
   virtual void restore(RowBlock&) noexcept {}
-  /// After relax_to_braking: appends what it had given up as recovery, which gets what the jerk limits leave. False: none.
+  /// After relax_to_braking: appends its recovery as rows, which use whatever jerk is left. False: none.
   virtual bool add_recovery(RowBlock&) noexcept { return false; }
-  /// Where something is lost: puts off recovery that opposes the way out.
+  /// While a clearance is lost: defers recovery that opposes the way out.
   virtual void defer_recovery(const Moment&, RowBlock&) noexcept {}
 
-  /// Whether the command is within its limits but for rounding, which it takes away. False: the solution is none.
+  /// Removes rounding from the command. False: the command is outside its limits, and the solution is rejected.
   virtual bool admit(TorqueSolution&) const noexcept { return true; }
-  /// Writes what it did into the solution, and raises the status where it gave way. wanted: acceleration that was solved for.
+  /// Writes its effect into the solution, and raises the status if it gave way. wanted: acceleration that was solved for.
   virtual void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
                       TorqueSolution& solution) const noexcept;
 };

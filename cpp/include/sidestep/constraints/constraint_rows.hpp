@@ -17,9 +17,9 @@ struct RowBlock {
   RowBlock(int capacity, int num_coordinates, Priority how_it_gives_way);
 
   void clear() noexcept;
-  /// Appends gradient·q̈ >= bound (or <= bound), gradient (nv) [m/rad or any unit per rad], bound [that unit /s²]; positive depth
-  /// [m]: how far the constraint is violated. A gradient that no joint changes sets `unreachable` if zero does not meet the bound.
-  /// Beyond the capacity nothing is appended.
+  /// Appends gradient·q̈ >= bound (or <= bound); gradient (nv) [m/rad, or any unit per rad], bound [that unit /s²]. depth [m]:
+  /// violation of the constraint, if positive. If no joint changes the gradient and zero does not meet the bound, sets
+  /// `unreachable`. Appends nothing beyond the capacity.
   void at_least(ConstVectorRef gradient, double bound, double depth = 0.0) noexcept;
   void at_most(ConstVectorRef gradient, double bound, double depth = 0.0) noexcept;
 
@@ -29,7 +29,7 @@ struct RowBlock {
   bool satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept;
   /// The bound of row k if it reads normal·q̈ >= bound; that of the row times -1 if it reads <=.
   double required(int k) const noexcept;
-  /// By how much an acceleration misses `required` [/s²]; negative if it exceeds it.
+  /// Shortfall of an acceleration from `required` [/s²]; negative if it exceeds it.
   double missing(int k, const Eigen::VectorXd& acceleration) const noexcept;
   /// The same in the unit of the gradient, and 0 where it is rounding. `scale`: size of the accelerations that cancel [/s²].
   double shortfall(int k, const Eigen::VectorXd& acceleration, double scale) const noexcept;
@@ -53,21 +53,21 @@ struct RowBlock {
 struct Box {
   explicit Box(int num_coordinates)
       : lower(Eigen::VectorXd::Zero(num_coordinates)), upper(Eigen::VectorXd::Zero(num_coordinates)) {}
-  Eigen::VectorXd lower, upper;  ///< (nv) [/s²]
+  Eigen::VectorXd lower, upper;  ///< Bounds (nv) [/s²].
 };
 
-/// Interval of the torque less the bias, M q̈, and which limit gives either end.
+/// Interval of the torque less the bias, M q̈, and the limit that sets each end.
 struct TorqueWindow {
   explicit TorqueWindow(int num_coordinates);
 
   /// Clamps a further interval of joint i into this one, so that a torque is always left.
   void narrow(Eigen::Index i, double least, double most, Limit least_limit, Limit most_limit) noexcept;
 
-  Eigen::VectorXd lower, upper;  ///< (nv) [Nm | N]
+  Eigen::VectorXd lower, upper;  ///< Bounds (nv) [Nm | N].
   std::vector<Limit> lower_limit, upper_limit;
 };
 
-/// What bounds all joints: read and narrowed by each constraint in turn.
+/// Bounds of all joints: each constraint in turn reads and narrows them.
 struct Bounds {
   explicit Bounds(int num_coordinates)
       : box(num_coordinates), firm_jerk(num_coordinates), wide(num_coordinates), torque(num_coordinates) {}

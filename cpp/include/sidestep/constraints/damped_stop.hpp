@@ -4,8 +4,8 @@
 
 namespace sidestep {
 
-/// What the arm does where no program can be solved: torque = M a + h with a = −v/time within the bounds, clipped to the effort limits
-/// and to what the rate allows. Without a usable mass matrix, h − D v clipped.
+/// Stop of the arm if no program can be solved: torque = M a + h with a = −v/time within the bounds, clipped to the effort and
+/// torque rate limits. Without a usable mass matrix, h − D v, clipped.
 struct DampedStop {
   double time = 0.1;      ///< Time constant [s].
   double damping = 0.25;  ///< Joint damping without a mass matrix, in units of effort limit / velocity limit [-].

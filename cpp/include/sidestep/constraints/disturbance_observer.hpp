@@ -7,32 +7,32 @@
 
 namespace sidestep {
 
-/// What a model of an arm lacks, from what its torques brought about.
+/// Observer of model errors: it compares the motion with the one that the model predicts for the torques.
 ///
-/// The arm moves by (M + J) v̇ + h = τ + d, with M and h of the model. The observer tells
-///   - the disturbance d: friction, payload, wrong gravity. With the acceleration a that was predicted with the d known so
-///     far, d changes by (M + J) (v̇ − a) T/T_o in every period T: it follows with the time constant T_o;
-///   - the inertias J of rotors (diagonal), which gears make larger than those of light links. Of every joint j alone it fits
+/// The arm moves by (M + J) v̇ + h = τ + d, with M and h of the model. The observer estimates
+///   - the disturbance d: friction, payload, wrong gravity. With the acceleration a predicted with the present d, d changes by
+///     (M + J) (v̇ − a) T/T_o in every period T: it follows with the time constant T_o;
+///   - the inertias J of rotors (diagonal), which gears make larger than those of light links. For each joint j it fits
 ///         τ − h − z = J v̇ + p z + f sign(v) + b v + c,     z = (M v̇)_j,
-///     by least squares over the last seconds of motion, all terms filtered: p is for a payload, which makes what the model has
-///     larger; f and b for dry and viscous friction, c for what is constant. Noise of velocities is in both sides, so the sums
-///     are taken with the accelerations that were predicted (instrumental variables). What was not excited counts as zero, and
-///     J counts only where the fit explains most of what is missing.
-/// Both are bounded: |d| by a share of the effort limits, J by a tenth of what the effort limit can accelerate at the
-/// acceleration limit. No member but the constructor allocates.
+///     by least squares over the last seconds of motion, with all terms filtered. p stands for a payload, which scales the
+///     model's inertia, f and b for dry and viscous friction, c for constant errors. Velocity noise is on both sides, so the
+///     sums use the predicted accelerations (instrumental variables). Terms that the motion does not excite count as zero,
+///     and J counts only if the fit explains most of the missing torque.
+/// Both are bounded: |d| by a share of the effort limits, J by a tenth of the effort limit over the acceleration limit. Only the
+/// constructor allocates.
 class DisturbanceObserver {
  public:
-  /// period, time: T, T_o [s], positive; share of the effort limits [-].
+  /// period, time: T, T_o [s], positive; share: bound of |d| over the effort limits [-].
   DisturbanceObserver(const JointLimits& limits, double period, double time, double share);
 
-  /// One period: velocity (nv) [/s] at its begin and end, the torque (nv) [Nm | N] that was sent, the acceleration (nv) that
-  /// was predicted for it, the model's mass matrix (nv × nv) and bias (nv) there. What is not finite changes nothing, nor does a
-  /// velocity that leaps once, as by an impact: by more than a tenth of its limit beyond what was predicted.
+  /// Takes one period: velocity (nv) [/s] at its begin and end, the torque sent (nv) [Nm | N], the predicted acceleration (nv), the
+  /// model's mass matrix (nv × nv) and bias (nv) there. Values that are not finite change nothing. Nor does a single jump of the
+  /// velocity, as by an impact, by more than a tenth of its limit beyond the prediction.
   void update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
               const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
 
-  /// The model's bias has changed by `change` (nv), as by a payload that it is told of now: what d had of that, it has no more.
-  /// What was seen of rotors was seen with the other model, and is forgotten; those that were found stay.
+  /// Removes `change` (nv) of the model's bias from d, for example when the model is told of a payload. Data about rotors came from
+  /// the previous model and are forgotten; estimates stay.
   void change_model(const Eigen::VectorXd& change) noexcept;
 
   const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }  ///< d (nv) [Nm | N]

@@ -71,17 +71,19 @@ struct MotionRequest {
 ///
 ///   minimise    1/2 (q̈ - a)'Q(q̈ - a) + 1/2 t'Rt,     t = torque / effort limit
 ///   subject to  M q̈ + h = torque                      (h: Coriolis, centrifugal and gravity forces)
-///               what each Constraint appends           (see constraint.hpp)
+///               the rows of each Constraint           (see constraint.hpp)
 ///
-/// The torque is eliminated by the equation of motion. Constraints give way in the order of Priority (priority.hpp). A first
-/// program has every constraint hard. If it is infeasible, rows are weakened to what braking takes; then the same is solved
-/// without jerk for the acceleration nearest to what jerk allows; then with slacks of comfort (SlackProgram); then, or where a
-/// clearance below zero is in the way, with the least shortfalls of clearances (ShortfallProgram). Where effort has a rate, jerk
-/// is lowered by a share with which torques keep it whatever the joints do; that share gives way first, the jerk limits
-/// themselves only to bounds that they do not reach, or where a clearance is below zero.
+/// The torque is eliminated by the equation of motion. Constraints give way in the order of Priority (priority.hpp). The first
+/// program has only hard constraints. If it is infeasible, the programs below follow, until one is feasible:
+///   1. the same with rows weakened to the least that keeps the current stop feasible;
+///   2. the same without jerk limits, for the acceleration nearest to what they allow;
+///   3. with slacks of comfort (SlackProgram);
+///   4. with the least shortfalls of clearances (ShortfallProgram), also if a lost clearance is in the way.
+/// With torque rate limits, the jerk limits are reduced by a share with which torques keep their rate for any motion. This share
+/// gives way first; the jerk limits themselves only to bounds that they do not reach, or if a clearance is lost.
 ///
-/// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
-/// the input of a constraint is unusable, the same without it. Otherwise DampedStop; an unusable h is replaced by the last usable
+/// Damped stop. If only the wanted acceleration is unusable, the program is solved with a = -v/stop_time; if the input of a
+/// constraint is unusable, the same without that constraint. Otherwise DampedStop. An unusable h is replaced by the last usable
 /// one (zero before the first), an unusable v by zero. Every fallback is counted.
 ///
 /// `solve` allocates nothing and never throws. One object per thread.
@@ -108,13 +110,13 @@ class MotionProgram {
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
  private:
-  /// Which parts of a request can be used.
+  /// Usable parts of a request.
   struct Known {
     bool q, v, acceleration, mass, bias, constraints;
     bool state() const noexcept { return q && v; }
     bool all() const noexcept { return q && v && mass && bias; }
   };
-  /// How a search in the hard program ended.
+  /// Result of a search in the hard program.
   struct Search {
     bool solved = false;
     bool kept_jerk = true;
@@ -123,16 +125,16 @@ class MotionProgram {
 
   Known take(const MotionRequest& request) noexcept;
   bool take_mass(const MotionRequest& request) noexcept;
-  /// Writes bounds and rows of all constraints, or of those that the damped stop keeps.
+  /// Writes the bounds and rows of all constraints, or of those that the damped stop keeps.
   void write(const Moment& now, const Known& known, TorqueSolution& solution) noexcept;
   bool solve_hard(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth, TorqueSolution& solution) noexcept;
   Search search(const Moment& now, TorqueSolution& solution) noexcept;
   bool search_without_jerk(const Moment& now, TorqueSolution& solution) noexcept;
   TorqueStatus solve_constrained(const Moment& now, bool usable, TorqueSolution& solution) noexcept;
-  /// The programs after the first; smooth: within the limits of jerk, which leave a solution.
+  /// Solves the programs after the first. smooth: within the jerk limits, which leave a solution.
   TorqueStatus solve_relaxed(const Moment& now, bool smooth, TorqueSolution& solution) noexcept;
   bool solve_slack(bool rounded, TorqueSolution& solution) noexcept;
-  /// What a relaxed solution leaves of bounds and rows; takes away rounding.
+  /// Status of a relaxed solution, by the bounds and rows that it violates; removes rounding.
   TorqueStatus judge_relaxed(bool box_reached, TorqueSolution& solution) const noexcept;
   /// Writes the torque of the solution's acceleration; false if it is beyond its limits.
   bool accept(TorqueSolution& solution) const noexcept;

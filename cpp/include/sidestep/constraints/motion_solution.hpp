@@ -10,24 +10,24 @@ namespace sidestep {
 
 /// How a solve ended, from best to worst. The command is safe to send after every one of them.
 enum class TorqueStatus {
-  ok,                      ///< the wanted acceleration is tracked, no limit in the way
-  limited,                 ///< optimal within the limits, and at least one of them is in the way
+  ok,                      ///< The wanted acceleration is tracked, and no limit is in the way.
+  limited,                 ///< Optimal within the limits, and at least one of them is in the way.
   relaxed,                 ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances,
                            ///< position or torque limits
-  relaxed_safety,          ///< not all clearances, position limits and overruns can be kept (see safety, slack)
-  clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
-  fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
-  fallback_solver,         ///< the quadratic program could not be solved: damped stop
+  relaxed_safety,          ///< Not all clearances, position limits and overruns can be kept (see safety, slack).
+  clearance_lost,          ///< The smallest clearance is below zero: in contact or inside, whatever the rest.
+  fallback_invalid_input,  ///< The input is unusable (see fault): damped stop.
+  fallback_solver,         ///< The quadratic program could not be solved: damped stop.
 };
 
-/// Which input is unusable.
+/// Unusable input of a solve.
 enum class TorqueFault { none, position, velocity, acceleration, mass_matrix, bias, clearances };
 
 /// Short names, for example "limited", "mass_matrix".
 const char* name(TorqueStatus status) noexcept;
 const char* name(TorqueFault fault) noexcept;
 
-/// What one solve did about one clearance.
+/// Effect of one clearance on a solve.
 struct SafetyRow {
   int coordinate;  ///< Coordinate of the clearance.
   int nearest;     ///< Its nearest obstacle point.
@@ -38,7 +38,7 @@ struct SafetyRow {
   double multiplier;  ///< Cost of the row to the task, >= 0; the largest one dominates.
 };
 
-/// What one solve gives. Made once, written by every solve.
+/// Result of a solve. Made once, written by every solve.
 struct TorqueSolution {
   explicit TorqueSolution(int num_coordinates, int max_safety_rows = 32);
 

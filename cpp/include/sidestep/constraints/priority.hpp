@@ -2,8 +2,8 @@
 
 namespace sidestep {
 
-/// What gives way first where not everything can be kept: the list of sacrifices, read from its end. The task gives way to all of
-/// it, since it is only the cost.
+/// Order in which constraints give way if not all can be kept: the last one first. The task gives way to all of them, since it is
+/// only the cost.
 enum class Priority {
   never,      ///< Torque limits and the rate of torque. If they cannot be kept, the arm makes a damped stop.
   position,   ///< Position limits, and the overruns of speed and acceleration: left only as far as torque requires.

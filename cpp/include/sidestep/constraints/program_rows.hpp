@@ -30,8 +30,8 @@ std::vector<Span> spans_of(const std::vector<RowBlock>& blocks, Priority priorit
 /// Most rows of this priority.
 int capacity_of(const std::vector<RowBlock>& blocks, Priority priority) noexcept;
 
-/// Writes the rows of a block that the box does not satisfy; the others have no bounds. slack: the variable by which they may be
-/// missed, -1: none.
+/// Writes the rows of a block that the box does not satisfy; the others get no bounds. slack: index of the variable that may
+/// violate them; -1: none.
 void write_rows(const RowBlock& block, Span at, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper, int slack,
                 QuadraticProgramData& data) noexcept;
 /// Writes the bounds of M q̈.

@@ -7,9 +7,9 @@
 namespace sidestep {
 
 struct SafetySettings {
-  /// Clearance that every command keeps [m]. Covers what the model does not see: the reduction over points is high by up to its
-  /// temperature (2 mm by default), tracking error, one period of delay, and 1.5/rate times what obstacles move without
-  /// saying so: 5 mm hold off what comes by up to 0.06 m/s. `Clearances::margins` where they are less.
+  /// Clearance that every command keeps [m], or `Clearances::margins` if smaller. Covers model errors: the mean over points is
+  /// high by up to its temperature (2 mm by default), tracking error, one period of delay, and 1.5/rate times the unknown speed
+  /// of obstacles: 5 mm hold off an approach of up to 0.06 m/s.
   double margin = 0.005;
   /// Largest closing speed of a slow arm per distance left, γ [1/s]. Larger approaches faster and reacts more to noise; γT must stay well
   /// below 1.

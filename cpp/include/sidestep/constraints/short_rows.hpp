@@ -4,7 +4,7 @@
 
 namespace sidestep {
 
-/// Rows of priority clearance that a box does not satisfy, and by how much each may fall short.
+/// Rows of priority clearance that a box does not satisfy, and the shortfall granted to each.
 class ShortRows {
  public:
   explicit ShortRows(const std::vector<RowBlock>& blocks);
@@ -15,7 +15,7 @@ class ShortRows {
     double allowed = 0.0;  ///< Shortfall granted [/s²], >= 0.
 
     bool lost() const noexcept { return block->depths[k] > 0.0; }
-    /// What the row asks for, less what is allowed; rounded: also where that is next to nothing.
+    /// Requirement of the row, less the shortfall granted. rounded: also if that is negligible.
     double lowered(bool rounded) const noexcept;
   };
 
@@ -32,13 +32,13 @@ class ShortRows {
   int size_ = 0;
 };
 
-/// Lets row `at` of a program ask for this much of a row's `required`.
+/// Writes row k of the block as row `at` of a program, with the bound `required`.
 void write_required(const RowBlock& block, int k, int at, double required, QuadraticProgramData& data) noexcept;
 
-/// Whether a row that is violated already bends the last solution. Then the least shortfalls are looked for also where all could be
-/// met: what only the last bit of an acceleration limit can give would come and go from step to step.
+/// Whether a row that is violated already bends the last solution. Then the least shortfalls are computed even if all rows could
+/// be met: a demand that needs the last bit of an acceleration limit would otherwise come and go from step to step.
 bool presses_for_lost(const std::vector<RowBlock>& blocks) noexcept;
-/// Whether a row that is not violated has less than it asks for.
+/// Whether a row that is not violated yet falls short.
 bool others_fall_short(const std::vector<RowBlock>& blocks, const Eigen::VectorXd& acceleration) noexcept;
 
 }  // namespace sidestep

@@ -5,20 +5,21 @@
 
 namespace sidestep {
 
-/// The programs that find by how much rows of clearance have to fall short: the shortfalls r of which Σ w r² is least, with
-/// w = |∇h|²/(|∇h|² + ε²): first of those that are not violated yet, then of those that are, w times their depth over the largest.
-/// What pulls two ways is shared, and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is
-/// first widened by the least squares that do. So there always is a solution.
+/// Programs of the least shortfalls r of clearance rows: min Σ w r² with w = |∇h|²/(|∇h|² + ε²), first for rows that are not
+/// violated yet, then for those that are, with w times their depth over the largest.
+///
+/// Opposing rows share the shortfall, and an arm that cannot get out comes to rest. If the torque cannot reach the box, the box is
+/// first widened in the least-squares sense. So there always is a solution.
 class ShortfallProgram {
  public:
   ShortfallProgram(int num_coordinates, const std::vector<RowBlock>& blocks);
 
-  /// How a search ended: `any` is false where rows that never give way contradict each other.
+  /// Result of a search: `any` is false if rows that never give way contradict each other.
   struct Found {
     bool any = true;
     bool within_box = true;  ///< Whether the box sufficed; otherwise it was widened.
   };
-  /// Writes what is to be allowed, an acceleration that falls short by no more, and the multipliers.
+  /// Writes the granted shortfalls, an acceleration within them, and the multipliers.
   Found solve(const TrackingCost& cost, Bounds& bounds, std::vector<RowBlock>& blocks, ShortRows& short_rows,
               TorqueSolution& solution) noexcept;
 
@@ -42,7 +43,7 @@ class ShortfallProgram {
 
   int nv_;
   std::vector<Program> programs_;  // Programs by number of rows, so that the usual few stay cheap.
-  SpanCounter counter_;            // of the widening: over (q̈, what it is outside the box)
+  SpanCounter counter_;            // Spans of the widening: over q̈ and its excess over the box.
   Span box_, torque_;
   std::vector<Span> never_;
   QuadraticProgramData widening_data_;

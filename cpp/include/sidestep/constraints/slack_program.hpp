@@ -5,8 +5,8 @@
 
 namespace sidestep {
 
-/// The program in which comfort gives way: over q̈, a slack per joint, and one slack for all rows of comfort, at the price p's
-/// far above the task's, within a wide box. Rows of clearance are lowered by what they may fall short.
+/// Program in which comfort gives way: over q̈, one slack per joint, and one slack for all rows of comfort, within a wide box. The
+/// price of slack is far above that of the task. Clearance rows are lowered by the shortfalls granted.
 class SlackProgram {
  public:
   SlackProgram(int num_coordinates, const std::vector<RowBlock>& blocks, double slack_weight);

@@ -14,20 +14,20 @@ namespace sidestep {
 //
 // Allowed speed. Let d be the distance to the nearest obstacle. Between (d₀, V₀), near, and (d₁, V₁), far,
 //     V(d)² = V₀² + 2 B (d − d₀),      B = (V₁² − V₀²) / 2 (d₁ − d₀),
-// is what braking along the way with B leaves: who comes nearer by its own motion, by V at most, brakes with V' V = B
-// wherever that is, 1.2 m/s² by default. What comes at w as well takes B (1 + w/V): most where V is small. A line from V₀
-// to V₁ would ask for the most where the arm is fastest.
+// is the speed of constant deceleration B: an arm that approaches at V brakes with V' V = B everywhere, 1.2 m/s² by default.
+// An obstacle that approaches with w needs B (1 + w/V), most where V is small. A straight line from V₀ to V₁ would need the
+// most where the arm is fastest.
 //
 // One frame at p. Its speed s = |ṗ| changes by n·p̈ with n = ṗ/s, and p̈ = J q̈ + J̇ v. With V₊ the limit after this
 // period, the difference V − s shrinks to no less than the share 1 − kT of it if
 //     n·J q̈ ≤ (V₊ − V)/T + k (V − s) − n·J̇ v,      k = 50/s, no more than half per period.
-// So a limit is neared without a step in acceleration (the jerk k n·p̈ is half of the default jerk limit), and where it
-// is exceeded (an obstacle that appears), the excess decays by k. V stands for 98 % of the limit: the rest is for terms of
-// order T², |p̈|² T²/2s, and for the onset of closing.
+// So the speed approaches its limit without a step in acceleration (the jerk k n·p̈ is half of the default jerk limit). If the
+// limit is exceeded (an obstacle appears), the excess decays with the rate k. V stands for 98 % of the limit: the rest is
+// for terms of order T², |p̈|² T²/2s, and for the onset of closing.
 //
-// What a row may ask for: no more than its share of the stop along the path, n·J q̈ ≥ −s/τ with τ = max_j |v_j| /
-// (acceleration limit)_j. As −v/τ slows every frame by that, and is within the acceleration limits, one and the same
-// acceleration meets all rows. Where clearances or torque limits do not let it, rows give way together.
+// A row demands at most its share of the stop along the path, n·J q̈ ≥ −s/τ with τ = max_j |v_j| / (acceleration limit)_j.
+// −v/τ slows every frame by that and is within the acceleration limits, so one acceleration meets all rows. If clearances
+// or torque limits prevent it, the rows give way together.
 
 struct SpeedLimitSettings {
   double near_speed = 0.25;    ///< Speed V₀ allowed at near_distance and nearer [m/s].
@@ -43,12 +43,12 @@ struct SpeedLimitSettings {
 template <>
 const std::vector<Field<SpeedLimitSettings>>& fields();
 
-/// The distinct frames of an arm that joints move, and how fast they are.
+/// Distinct frames of an arm that joints move, and their speeds.
 class FrameSpeeds {
  public:
   explicit FrameSpeeds(const Robot& robot);
 
-  /// The speed of the fastest frame [m/s], and which it is (-1: none moves).
+  /// Speed of the fastest frame [m/s], and its index (-1: none moves).
   struct Fastest {
     double speed = 0.0;
     int frame = -1;

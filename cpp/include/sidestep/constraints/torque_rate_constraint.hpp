@@ -4,7 +4,7 @@
 
 namespace sidestep {
 
-/// Share of the jerk limits with which no torque exceeds its rate, whatever the joints do, M (nv, nv); 1 without a rate.
+/// Share of the jerk limits with which no torque exceeds its rate, for any motion of the joints; M (nv, nv). 1 without a rate.
 double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits) noexcept;
 
 /// Rate of torque: |torque − last torque| <= effort rate · T, as far as effort allows.

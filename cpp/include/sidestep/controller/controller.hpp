@@ -53,10 +53,10 @@ class Controller {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Claims a controller for one run, in programs where two parts might call `step`.
+  /// RAII lock: claims the controller for one caller. `step` itself does not check.
   class ClaimedController {
    public:
-    /// Throws std::runtime_error if it is reserved already.
+    /// Throws std::runtime_error if it is claimed already.
     explicit ClaimedController(Controller& controller);
     ClaimedController(const ClaimedController&) = delete;
     ClaimedController& operator=(const ClaimedController&) = delete;

@@ -7,40 +7,40 @@
 
 namespace sidestep {
 
-/// A stop within the limits of acceleration and jerk, known to its end: the fail-safe manoeuvre of Pek and Althoff ("Fail-safe
-/// motion planning for online verification of autonomous vehicles", 2018), for a joint space.
+/// Trajectory to rest within the limits of acceleration and jerk: the fail-safe trajectory of Pek and Althoff ("Fail-safe motion
+/// planning for online verification of autonomous vehicles", 2018), in joint space.
 ///
-/// Joint j has the acceleration a_j and the velocity v_j, and accelerations are held for periods T. In r periods its
-/// acceleration goes linearly to −p_j, stays there for m periods, and in r more goes linearly to zero. The velocity is zero then,
-/// exactly, if
+/// Joint j has the acceleration a_j and the velocity v_j, and accelerations are held for periods T. Its acceleration changes
+/// linearly to −p_j in r periods, stays there for m periods, and changes linearly to zero in r more. The velocity then is exactly
+/// zero if
 ///
 ///     p_j = (v_j/T + a_j (r − 1)/2) / (r + m).
 ///
-/// All joints have the same r and m, the least of two shapes with which every joint keeps its limits: the arm stops nearly along
-/// its path. A joint that would leave its position or velocity limits so has the least r and m of its own.
+/// All joints share r and m, the shortest with which every joint keeps its limits, so the arm stops nearly along its path. A joint
+/// that would leave its position or velocity limits that way gets its own shortest r and m.
 class StopTrajectory {
  public:
   explicit StopTrajectory(int num_coordinates);
 
-  /// Plans the stop from q [rad | m], v [/s], a [/s²] (nv), finite; period T [s]. Of jerk limits it takes `jerk_share`. False where
-  /// no stop with ramps of at most `most_periods` keeps acceleration, position and velocity limits. No allocation.
+  /// Plans the stop from q [rad | m], v [/s], a [/s²] (nv), finite; period T [s]. Uses `jerk_share` of the jerk limits. False if no
+  /// stop with ramps of at most `most_periods` keeps the acceleration, position and velocity limits. No allocation.
   [[nodiscard]] bool plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const JointLimits& limits, double period,
                           double jerk_share = 1.0) noexcept;
 
-  /// The periods that are left until rest.
+  /// Number of periods left until rest.
   int num_periods() const noexcept { return num_periods_ - passed_; }
-  /// By how much every joint moves at most, from where the stop was planned on (nv) [rad | m].
+  /// Largest distance of each joint from where the stop was planned (nv) [rad | m].
   const Eigen::VectorXd& way() const noexcept { return way_; }
-  /// The acceleration between the ramps (nv) [/s²].
+  /// Acceleration between the ramps (nv) [/s²].
   const Eigen::VectorXd& hardest() const noexcept { return hardest_; }
-  /// Writes the acceleration (nv) [/s²] in the period that begins in `periods`.
+  /// Writes the acceleration (nv) [/s²] of the period that begins after `periods` more.
   void acceleration(int periods, Eigen::VectorXd& a) const noexcept;
-  /// Writes the configuration (nv) [rad | m] after so many periods.
+  /// Writes the configuration (nv) [rad | m] after `periods` more.
   void position(int periods, Eigen::VectorXd& q) const noexcept;
-  /// Goes on by a period.
+  /// Advances by one period.
   void advance() noexcept { ++passed_; }
 
-  static constexpr int most_periods = 4000;
+  static constexpr int most_periods = 4000;  // Longest ramp that is tried, in periods.
 
  private:
   struct Shape {
@@ -55,10 +55,10 @@ class StopTrajectory {
   static bool keeps(double v, double a, double most_a, double most_step, const Shape& shape, double period) noexcept;
   double at(Eigen::Index joint, int period) const noexcept;
 
-  /// Where joint `joint` is after so many periods since the stop was planned.
+  /// Position of a joint after this many periods since the stop was planned.
   double place(Eigen::Index joint, int periods) const noexcept;
 
-  /// Of a joint where it begins, where its hold begins and where it ends.
+  /// Position and velocity of a joint at the begin of the stop, and at the begin and end of its hold.
   struct Passes {
     double q = 0.0, v = 0.0, held_q = 0.0, held_v = 0.0, left_q = 0.0, left_v = 0.0;
   };

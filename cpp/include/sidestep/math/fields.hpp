@@ -7,7 +7,7 @@
 
 namespace sidestep {
 
-/// One number of a settings struct: all that its users need to know.
+/// Description of one field of a settings struct.
 template <class Settings>
 struct Field {
   const char* name;
@@ -17,9 +17,9 @@ struct Field {
   const char* trades;  ///< One sentence: what the setting is, and what larger and smaller values trade.
 };
 
-/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning
-/// stand: `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are
-/// those of the struct.
+/// The fields of a settings struct, in the order of its documentation: the only place that states unit, range and meaning.
+/// `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are those of
+/// the struct.
 template <class Settings>
 const std::vector<Field<Settings>>& fields();
 
@@ -32,7 +32,7 @@ double value_of(const Field<Settings>& field, const Settings& settings) {
 /// Throws std::invalid_argument "<setting> is <value>, allowed: <least> to <most>" unless the value is in the range.
 void check_range(const std::string& setting, double value, double least, double most, const char* unit);
 
-/// The same of every field; group: what comes before its name, such as "safety: ".
+/// Checks every field; `group` precedes its name in messages, such as "safety: ".
 template <class Settings>
 void check_fields(const char* group, const Settings& settings) {
   for (const Field<Settings>& field : fields<Settings>()) {

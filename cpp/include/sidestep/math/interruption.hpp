@@ -5,8 +5,7 @@
 
 namespace sidestep {
 
-/// Asked now and then by work that takes long, in the thread that began it, whether what is worked on is no longer
-/// wanted.
+/// Predicate that long work calls now and then, in the thread that began it: true if its result is no longer wanted.
 using Interrupted = std::function<bool()>;
 inline bool never_interrupted() { return false; }
 

@@ -8,11 +8,11 @@ namespace sidestep {
 /// How a solve ended. Only after `solved` is the solution meaningful.
 enum class QuadraticProgramStatus {
   solved,
-  infeasible,             ///< no point satisfies every constraint
-  max_iterations,         ///< gave up; numerically hopeless data
-  not_positive_definite,  ///< the Cholesky factorisation of H failed
+  infeasible,             ///< No point satisfies every constraint.
+  max_iterations,         ///< Gave up: numerically hopeless data.
+  not_positive_definite,  ///< The Cholesky factorisation of H failed.
   not_finite,             ///< NaN anywhere, or an infinity in H, g or A
-  wrong_size,             ///< the data do not have the size of the solver
+  wrong_size,             ///< The data do not have the size of the solver.
 };
 
 /// A short name, for example "solved".
@@ -91,14 +91,14 @@ class QuadraticProgram {
   std::vector<char> is_active_;  // Whether a constraint is active (n + m).
   Eigen::MatrixXd cholesky_;     // L of the coupled part, H = L L'
   Eigen::MatrixXd J_;            // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
-  Eigen::MatrixXd R_;            // upper triangular, (num_active_, num_active_) in use; N: active normals
+  Eigen::MatrixXd R_;            // Upper triangular factor, (num_active_, num_active_) in use; N: active normals.
   Eigen::VectorXd x_, multipliers_;
   int num_coupled_ = 0;  // Size of the leading block of H that is not diagonal.
   // (m, n) where rows of A in use are not zero
   Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;
   Eigen::VectorXi support_sizes_;  // Number of nonzero entries of each row (m).
-  Eigen::VectorXd row_norms_;      // |row| of A
-  Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
+  Eigen::VectorXd row_norms_;      // Norms of the rows of A.
+  Eigen::VectorXd u_;              // Multipliers of the active constraints, >= 0 for inequalities.
   Eigen::VectorXd d_, r_, z_, y_;  // J' n, R^-1 d_1, step direction J_2 d_2, coordinates of x in J
 };
 

@@ -8,8 +8,8 @@ namespace sidestep {
 /// A vector that a function reads.
 using ConstVectorRef = const Eigen::Ref<const Eigen::VectorXd>&;
 
-/// Calls `f` with the number of joint coordinates: as a constant, where it is one that arms commonly have, so that
-/// loops over them are unrolled. Their counters cost more than so few numbers do.
+/// Calls `f` with the number of joint coordinates. Common numbers are passed as compile-time constants, so that loops are
+/// unrolled: for so few coordinates loop counters cost more than the arithmetic.
 template <class F>
 decltype(auto) with_size(Eigen::Index nv, F&& f) {
   switch (nv) {

@@ -11,9 +11,9 @@ namespace sidestep {
 /// Every joint has a reference of its own. In a period T it goes from the speed v towards the target to the largest w
 /// from which it still stops there with the deceleration A,
 ///     w²/2A + T w/2 + T (v + w)/2 <= distance left,    |w − v| <= A T,    w <= V
-/// (the first two terms are what a stop in whole periods takes at most: it ends at the target, not beyond), with A and
-/// V nine tenths of the joint's acceleration limit (90 /s² where there is none) and velocity limit: what is left serves
-/// to follow it. It is followed with a* + ω² (q* − q) + 2ω (v* − v), q*, v*, a* the reference, ω = 10 /s.
+/// (the first two terms bound a stop in whole periods: it ends at the target, not beyond). A and V are nine tenths of the
+/// joint's acceleration limit (90 /s² without one) and velocity limit; the rest is for feedback. The reference q*, v*, a* is
+/// followed with a* + ω² (q* − q) + 2ω (v* − v), ω = 10 /s.
 ///
 /// Obstacles are ignored here: the acceleration is for a MotionProgram with clearances.
 class AvoidanceTrajectory {

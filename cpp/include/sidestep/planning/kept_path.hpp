@@ -11,13 +11,13 @@
 
 namespace sidestep {
 
-/// The path that a planner keeps to: its waypoints, the same with round corners, and as a motion.
+/// Path of a planner: its waypoints, the same with round corners, and as a motion.
 class KeptPath {
  public:
-  /// Rounds a path (nv × W) that keeps `margins`. What `motion` is of is still the path before.
+  /// Rounds a path (nv × W) that keeps `margins`. `motion` stays that of the previous path.
   void replace(const Eigen::MatrixXd& waypoints, const Margins& margins, const ClearanceQuery& body, const Obstacles& obstacles,
                ClearanceQuery::Workspace& w);
-  /// Gives it another motion, with a number of its own.
+  /// Sets another motion, with a number of its own.
   void time(TimedPath motion);
 
   const Eigen::MatrixXd& waypoints() const noexcept { return waypoints_; }
@@ -26,11 +26,11 @@ class KeptPath {
   const std::shared_ptr<const TimedPath>& motion() const noexcept { return motion_; }
   std::uint64_t motion_number() const noexcept { return motion_number_; }
 
-  /// Where it is after a length [rad | m].
+  /// Configuration at a station [rad | m].
   Eigen::VectorXd at(double station) const;
-  /// The first waypoint beyond a length; not beyond the last.
+  /// First waypoint beyond a station; at most the last.
   Eigen::Index waypoint_after(double station) const;
-  /// Whether it is still free from a length on.
+  /// Whether the path is still free from a station on.
   bool is_free_from(double station, const ClearanceQuery& body, const Obstacles& obstacles, ClearanceQuery::Workspace& w) const;
 
  private:

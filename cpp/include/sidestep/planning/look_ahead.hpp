@@ -27,12 +27,12 @@ struct LookAheadSettings {
   double clearance = 0.004;  ///< Clearance from obstacles that a motion must keep [m].
   int tries = 500;           ///< Trajectories that one look draws.
   std::uint64_t seed = 0;
-  // Of a Controller whose look-ahead runs in a thread. With enough processor time a look is at most two delays and one wake-up old.
+  // For a Controller whose look-ahead runs in a thread. With enough processor time a look is at most two delays and one wake-up old.
   double slow_after = 3.0;   ///< Age of a look from which the arm is slowed, in delays.
   double rest_after = 10.0;  ///< Age of a look at which the arm rests, in delays: 1 s, in which a person walks 1.6 m.
 
-  /// The share of its speed that an arm may move at beside what moves, with a look of this age [s]: 1 up to slow_after delays,
-  /// then linear, to 0 at rest_after.
+  /// Share of its speed that an arm may use among moving obstacles, with a look of this age [s]: 1 up to slow_after delays, then
+  /// linear, to 0 at rest_after.
   double pace(double age) const noexcept;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -41,31 +41,29 @@ struct LookAheadSettings {
 template <>
 const std::vector<Field<LookAheadSettings>>& fields();
 
-/// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
-/// limit stops the arm, where a step aside would have let it pass.
+/// Leads an arm out of the way of moving obstacles, in time. A barrier alone backs off along the line of approach until a joint
+/// limit stops the arm, where a step aside would have let the obstacle pass.
 ///
-/// In a look the system, with clearances and limits as a MotionProgram keeps them (by torque where the dynamics are
-/// given), is integrated from where the arm will be when the look has ended, with the obstacles
-/// moving on as they do. If on its way to the goal that comes nearer to an obstacle than `clearance`, and so does the
-/// trajectory that is followed already, trajectories to random configurations are drawn: near ones, far ones and such
-/// as are near that of the trajectory followed. They are filtered in three stages. Those come first whose references,
-/// without a filter, get farthest before the body is deep in an obstacle, which is quick to say. They are integrated by
-/// steps of 0.05 s, as many as there is time for; then those that keep farthest away by steps of `period`, until one is
-/// found that keeps `clearance`. If none does, that is followed whose least clearance is largest, or of those that go
-/// through an obstacle the one that comes to it last. The goal is followed again as soon as its own way is free.
+/// A look predicts the motion of the system, with clearances and limits as a MotionProgram keeps them (by torque if the
+/// dynamics are given), from where the arm will be when the look ends, with obstacles at constant velocity. If both the way to
+/// the goal and the trajectory being followed come closer to an obstacle than `clearance`, it draws trajectories to random
+/// configurations: near ones, far ones, and some close to the followed one. It filters them in three stages:
+///   1. by how far their references get, without the program, before the body is deep in an obstacle: quick to compute;
+///   2. by their least clearance in time steps of 0.05 s, as many trajectories as there is time for;
+///   3. by that in time steps of `period`, best first, until one keeps `clearance`.
+/// If none keeps it, the arm follows the one of the largest least clearance or, if all collide, the one that collides last. It
+/// follows the goal again as soon as the way to the goal is free.
 ///
-/// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque
-/// controller, which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves,
-/// nothing is looked at.
-///
-/// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
+/// A trajectory is no motion of the system, whose barriers would push the arm off it. The MotionProgram, which is required,
+/// keeps the arm off obstacles and itself, and within limits. If nothing moves, nothing is predicted. Towards a goal that
+/// exerts no attraction, such as one outside the limits, the arm is predicted to come to rest, as it does.
 ///
 /// `update` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
 /// simulated time. One thread at a time.
 class LookAhead {
  public:
-  /// Moves a goal on for a duration [s] while the arm is at q, v (nv): along a path, for example. Empty: as the goal's own
-  /// velocity says (`advance`). Each motion that is looked at has a copy.
+  /// Function that advances a goal for a duration [s] while the arm is at q, v (nv), for example along a path. Empty: the goal
+  /// advances by its own velocity (`advance`). Each predicted motion has a copy.
   using Leader = std::function<void(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal)>;
 
   /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
@@ -73,29 +71,28 @@ class LookAhead {
   explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {},
                      std::optional<RigidBodyDynamics> dynamics = std::nullopt);
 
-  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the trajectory that is
-  /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
-  /// it is empty, as it is if nothing moves or the state is unusable. Allocates.
+  /// Looks ahead from the present q, v (nv) [rad | m, /s], obstacles and followed trajectory, if any. Returns the trajectory to
+  /// follow from `delay` on; empty: the goal. It is empty if nothing moves or the state is unusable. Allocates.
   std::optional<AvoidanceTrajectory> update(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                                             const Obstacles& obstacles,
                                             const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
                                             const Leader& leader = {});
 
-  /// The trajectory to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every
-  /// `delay`, and follows what the look before found.
+  /// The trajectory to follow in a step of `period` [s] of a simulation; null: the goal. Looks every `delay`, and follows the
+  /// result of the look before.
   const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                                     const Obstacles& obstacles, double period, const Leader& leader = {});
   /// Whether the next `pursue` looks.
   bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
-  /// Before another motion is pursued: what was found is forgotten.
+  /// Forgets all results, before another motion is pursued.
   void reset() noexcept;
   /// As if `pursue` had found a trajectory before. No allocation after the first time.
   void resume(const AvoidanceTrajectory& trajectory) { found_ = pursued_ = trajectory; }
 
-  /// Ends a look once it says so, by an Interruption: what was found before stays.
+  /// Sets a predicate that ends a look by an Interruption; earlier results stay.
   void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
 
-  /// How many trajectories were found.
+  /// Number of trajectories found.
   int count() const noexcept { return count_; }
   const LookAheadSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return system_->robot().num_coordinates(); }
@@ -113,20 +110,20 @@ class LookAhead {
     double clearance;
     AvoidanceTrajectory flight;
   };
-  /// What integrates motions by a period [s].
+  /// Integrator of motions, with time step `period` [s].
   struct Stepper {
     double period;
     MotionProgram program;  // Program of the arm; by torque if the dynamics are given.
-    int steps = 0;          // integrated so far
+    int steps = 0;          // Steps integrated so far.
 
     Stepper(const Robot& robot, double period, bool by_torque);
   };
 
   void check_interrupted() const;
-  /// Moves on by one period; the least clearance from obstacles at its beginning [m].
+  /// Advances by one period; returns the least clearance from obstacles at its begin [m].
   double advance(Motion& motion, Stepper& stepper);
-  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that
-  /// goes through an obstacle less, by what is left of the horizon then, at 1 m/s.
+  /// Least clearance [m] of a motion up to the horizon; ends at any that is at most `enough`. If it collides, the rest of the
+  /// horizon is subtracted, at 1 m/s, so that later collisions rank higher.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
   double obstacle_clearance(const Clearances& clearances) const noexcept;
   /// Random trajectories from a state, those first whose references get farthest before the body is deep in an

@@ -18,27 +18,27 @@
 
 namespace sidestep {
 
-/// What a motion led by an OnlinePlanner is about.
+/// Status of a motion that an OnlinePlanner leads.
 enum class OnlinePlannerStatus {
-  idle,                ///< no goal was given
-  moving,              ///< on the way
-  arrived,             ///< every joint is at the goal
-  no_path,             ///< none was found within the budget; looked for again when the scene changes, or after a while
-  goal_in_collision,   ///< the goal is blocked; it is gone to when it becomes free
-  start_in_collision,  ///< the arm is in something; the reactive layer brings it out
-  timeout,             ///< the time for the motion is over; it goes on
-  invalid,             ///< the goal is outside the position limits, or the state is not finite
+  idle,                ///< No goal was given.
+  moving,              ///< On the way.
+  arrived,             ///< Every joint is at the goal.
+  no_path,             ///< No path was found within the budget; searched again when the scene changes, or after a while.
+  goal_in_collision,   ///< The goal is blocked; the arm goes there when it becomes free.
+  start_in_collision,  ///< The arm is in something; the reactive layer brings it out.
+  timeout,             ///< The time for the motion is over; the motion continues.
+  invalid,             ///< The goal is outside the position limits, or the state is not finite.
 };
 
 /// Short names, for example "goal_in_collision".
 const char* name(OnlinePlannerStatus status) noexcept;
 
-/// Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
+/// Leads an arm to a goal along a path that is searched in the background, by a reference that runs ahead on the path.
 ///
-/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path the
-/// reference is the goal itself; where the straight way to the goal is free, it is the path. In its own thread the
-/// planner looks, every `period`, whether the way ahead is still free among the newest obstacles and the arm makes
-/// progress, and searches again from where the arm is where that is not so; after a stop with a larger margin.
+/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path, the
+/// reference is the goal itself; a free straight way to the goal is the path. In its own thread the planner checks, every
+/// `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress. If not, it searches
+/// again from where the arm is; after a stop with a larger margin.
 class OnlinePlanner {
  public:
   /// Throws std::invalid_argument that names the setting at fault.
@@ -50,14 +50,14 @@ class OnlinePlanner {
   /// From the loop that calls `step()`. Throws std::invalid_argument on a size or an entry that is not finite.
   void set_goal(const Eigen::VectorXd& goal);
 
-  /// The obstacles as they are seen now; from any thread, best the camera's. It allocates, and waits for no search.
-  /// The same points again are no change.
+  /// Sets the present obstacles; from any thread, best that of the camera. Allocates, and waits for no search. The same points
+  /// again are no change.
   void set_obstacles(const Obstacles& obstacles) { exchange_.set_obstacles(obstacles); }
 
-  /// The current reference: position, velocity and acceleration (nv) of a JointGoal; and where activation distances
-  /// shrink, see GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow
-  /// places of the path that the arm is about to pass, or the goal where there is none; at the goal as well where the
-  /// arm `arrives`: there are some, and the end of the path is within the lead.
+  /// The current reference: position, velocity and acceleration (nv) of a JointGoal, and the places where activation distances
+  /// shrink, see GeometricSystem::lower_activations. These are the first `num_places` columns of `places` (nv): narrow places
+  /// of the path that the arm is about to pass, or the goal if there is none. `arrives`: there are some, and the end of the
+  /// path is within the lead, so that the goal counts as well.
   struct Reference {
     explicit Reference(Eigen::Index nv)
         : position(Eigen::VectorXd::Zero(nv)),
@@ -71,31 +71,31 @@ class OnlinePlanner {
     bool arrives = false;
   };
 
-  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: activation distances shrink
-  /// only near static obstacles. For the loop; allocates nothing.
+  /// Whether a moving obstacle is within 10 cm of the arm, or could be in a second: activation distances shrink only near
+  /// static obstacles. For the loop; allocates nothing.
   [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
-  /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status
-  /// is `invalid`. Never blocks; allocates nothing unless synchronous.
+  /// One step of the loop, at a time [s] that never decreases; if it is not finite, nothing changes and the status is
+  /// `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Reference& reference) noexcept;
 
-  /// Time since the state that the planner has looked at last, or since the goal was set, at a time [s] of the last `step`; in a
-  /// look by the machine's clock where that is longer. 0: synchronous, or no goal. For the loop.
+  /// Age [s] of the state that the planner has checked last, or of the goal, at the time [s] of the last `step`; during a check
+  /// by the machine's clock if that is longer. 0: synchronous, or no goal. For the loop.
   double age(double time) const noexcept;
 
-  /// The pace that the reference may go at along the path at most, see TimedPathFollower; from the loop.
+  /// Limits the pace of the reference along the path, see TimedPathFollower; from the loop.
   void limit_pace(double most) noexcept { follower_.most = most; }
 
-  /// For a synchronous planner: ends a search under way once it says so, as if time ran out.
+  /// Sets a predicate that ends a search of a synchronous planner, as if time ran out.
   void interrupt_when(Interrupted interrupted) {
     if (settings_.synchronous) {
       keeper_.interrupt_when(std::move(interrupted));
     }
   }
 
-  /// What the planner found last: the path, or what is in the way. A copy; not for the loop.
+  /// Last result of the planner: the path, or what is in the way. A copy; not for the loop.
   Plan last_plan() const { return exchange_.last_plan(); }
-  /// Which timed path the loop follows, 0 if none, and where it is on it. For the loop; allocates nothing.
+  /// Number of the timed path that the loop follows (0: none), and the place on it. For the loop; allocates nothing.
   struct Following {
     std::uint64_t route_number = 0;
     TimedPathFollower follower = {};
@@ -115,15 +115,15 @@ class OnlinePlanner {
   const Answer* taken() const noexcept { return takes_ ? &exchange_.answers.current() : nullptr; }
   /// The look whose age the last `step` took over, likewise.
   const Looked* taken_look() const noexcept { return takes_look_ ? &exchange_.looked.current() : nullptr; }
-  /// What the next `step` takes over, of a planner that does not work by itself.
+  /// Sets the answer that the next `step` takes over, for a planner that does not work by itself.
   void give(Answer answer) { exchange_.answers.put(std::move(answer)); }
   void give(Looked look) { exchange_.looked.put(look); }
 
  private:
   void run();
-  /// Tells the planner's side where the arm is; looks at once if it is synchronous.
+  /// Sends the state to the planner's side; checks it at once if synchronous.
   void tell(ConstVectorRef q, double time);
-  /// Takes over what the planner's side found.
+  /// Takes over the answer of the planner's side.
   void hear(double time) noexcept;
   /// Whether the planner's answer is about the goal, and a path.
   bool leads(const Answer& answer) const noexcept {

@@ -13,7 +13,7 @@
 
 namespace sidestep {
 
-/// How an OnlinePlanner searches, and how its paths are followed.
+/// Settings of an OnlinePlanner: search, and following of paths.
 struct OnlinePlannerSettings {
   PlannerSettings search = {};
   TimedPathSettings route = {};
@@ -24,7 +24,7 @@ struct OnlinePlannerSettings {
 template <>
 const std::vector<Field<OnlinePlannerSettings>>& fields();
 
-/// What an OnlinePlanner is made for.
+/// Configuration of an OnlinePlanner.
 struct OnlinePlannerConfig {
   OnlinePlannerSettings planner = {};
   std::optional<RigidBodyDynamics> dynamics;  ///< Dynamics of an arm that is moved by torque: paths are timed for its motors.

@@ -18,9 +18,8 @@ namespace sidestep {
 
 /// The part of an OnlinePlanner beside the loop: checks the scene, finds paths and keeps to them.
 ///
-/// At every state that it takes from the exchange it says whether the way ahead is still free among the newest obstacles and the
-/// arm makes progress, and searches again from where the arm is where that is not so; after a stop with a larger margin. One
-/// thread at a time.
+/// For every state from the exchange it checks whether the way ahead is still free among the newest obstacles and the arm makes
+/// progress. If not, it searches again from where the arm is; after a stop with a larger margin. One thread at a time.
 class PathKeeper {
  public:
   using State = PlannerExchange::State;
@@ -30,12 +29,12 @@ class PathKeeper {
   /// All of them must outlive the keeper.
   PathKeeper(const ClearanceQuery& body, const OnlinePlannerConfig& settings, PlannerExchange& exchange);
 
-  /// Checks the way of a state, and answers where something changes. What is thrown costs this update alone, not the process.
+  /// Checks the way of a state, and answers if something changes. An exception costs this update alone, not the process.
   void update(const State& state) noexcept;
-  /// Updates to the newest state, unless it has, and says so.
+  /// Updates to the newest state, unless already done, and reports it.
   void update_to_newest();
 
-  /// Ends a search under way once it says so, as if time ran out.
+  /// Sets a predicate that ends a search, as if time ran out.
   void interrupt_when(Interrupted interrupted) { search_.interrupt_when(std::move(interrupted)); }
   /// Ends a search once `stopping`, at a new goal, and where something new blocks the path that it improves.
   void interrupt_when_overtaken(const std::atomic<bool>& stopping);
@@ -43,15 +42,15 @@ class PathKeeper {
  private:
   void check_way(const State& state);
   void take_goal(const State& state);
-  /// The margin [m] with which the way straight to the goal is taken; empty where a path is held on to, or it is not free.
+  /// Margin [m] with which the straight way to the goal is taken; empty if it is not free, or the present path is kept.
   std::optional<double> straight_margin(const State& state, const Obstacles& obstacles, bool stuck);
   void go_straight(const State& state, double margin, const Obstacles& obstacles);
   void search(const State& state, const Obstacles& obstacles);
-  /// Improves the first path of a search, which an arm may follow meanwhile; false if something new blocks that one.
+  /// Improves the first path of a search, which an arm may follow meanwhile; false if something new blocks that path.
   bool improve(Plan& plan, const State& state, const Obstacles& obstacles, std::uint64_t seed, double margin);
   /// Whether something new blocks the first path, while a better one is made from it.
   bool overtaken();
-  /// Whether the straight edge to the reference is free, or else finds back to the path, which begins where it is then.
+  /// Whether the arm can keep its path: the straight edge to the reference is free, or another way back to the path is.
   bool holds_on(const State& state, const Obstacles& obstacles);
   void follow(const State& state, const Eigen::MatrixXd& path, const Margins& margins, const Obstacles& obstacles,
               bool measured);

@@ -20,15 +20,15 @@ class RoundedPath {
   /// Corners that stay sharp.
   explicit RoundedPath(const Eigen::MatrixXd& path);
 
-  /// Corners as wide as half of the neighbouring edges (all of it at an end) allow, halved until they are free: judged as
-  /// edges are, on chords that no point of the arm leaves by more than half a millimetre. A corner that is free at no
-  /// width keeps one at which it leaves the path by no more than that.
+  /// Rounds corners as wide as half of the neighbouring edges (all of it at an end) allows, and halves them until they are free.
+  /// They are checked as edges, on chords from which no point of the arm deviates by more than half a millimetre. A corner that
+  /// is free at no width keeps one at which it leaves the path by no more than that.
   RoundedPath(const Eigen::MatrixXd& path, const ClearanceQuery& body, const Obstacles& obstacles, const Margins& margins,
               ClearanceQuery::Workspace& workspace);
 
   double length() const noexcept { return starts_.empty() ? 0.0 : starts_.back(); }
 
-  /// What there is at a station, derivatives by s (nv).
+  /// Configuration and its derivatives by s (nv) at a station.
   struct Point {
     Eigen::VectorXd q, first, second;
   };
@@ -37,7 +37,7 @@ class RoundedPath {
   /// Stations, ascending, no farther apart than `spacing`, both ends of all edges and roundings among them.
   Eigen::VectorXd stations(double spacing) const;
 
-  /// Where corners begin and end; no width: sharp.
+  /// Middle and half width of a corner; half width 0: sharp.
   struct Corner {
     double station, half;
   };

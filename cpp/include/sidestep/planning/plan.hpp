@@ -8,20 +8,20 @@
 
 namespace sidestep {
 
-/// What a search says about its result.
+/// Result of a search.
 enum class PlanStatus {
-  found,               ///< there is a path
-  no_path,             ///< none within the budget of nodes, iterations and checks
-  timeout,             ///< none within the budget of time
-  start_in_collision,  ///< see Plan::obstruction
-  goal_in_collision,   ///< see Plan::obstruction
-  invalid,             ///< start or goal is not finite, or outside the position limits by more than JointLimits::rounding
+  found,               ///< There is a path.
+  no_path,             ///< No path within the budget of nodes, iterations and checks.
+  timeout,             ///< No path within the budget of time.
+  start_in_collision,  ///< The start is in collision, see Plan::obstruction.
+  goal_in_collision,   ///< The goal is in collision, see Plan::obstruction.
+  invalid,             ///< Start or goal is not finite, or outside the position limits by more than JointLimits::rounding.
 };
 
 /// Short names, for example "goal_in_collision".
 const char* name(PlanStatus status) noexcept;
 
-/// What is in the way at an end of a motion.
+/// Obstruction at an end of a motion.
 struct Obstruction {
   CoordinateLabel label;  ///< Kind, link, and the other link of a pair.
   int point = -1;         ///< Index of the obstacle point; -1 for a pair or a plane.

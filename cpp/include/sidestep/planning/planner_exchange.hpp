@@ -14,10 +14,10 @@
 
 namespace sidestep {
 
-/// What a loop and the planner beside it tell each other. The loop's side never waits.
+/// Exchange between a loop and the planner beside it. The loop's side never waits.
 class PlannerExchange {
  public:
-  /// What the loop tells the planner.
+  /// Message of the loop to the planner.
   struct State {
     Eigen::VectorXd q, v, goal;
     double time = 0.0, station = 0.0;
@@ -27,7 +27,7 @@ class PlannerExchange {
     std::chrono::steady_clock::time_point written{};
   };
 
-  /// What the planner tells the loop.
+  /// Message of the planner to the loop.
   struct Answer {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
@@ -39,7 +39,7 @@ class PlannerExchange {
     double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the duration by the machine's clock.
   };
 
-  /// How often the planner searched for a path, and how often it found one.
+  /// Numbers of searches, and of paths found.
   struct Counts {
     int searches = 0, found = 0;
   };
@@ -50,12 +50,12 @@ class PlannerExchange {
   TripleBuffer<Answer> answers;
   TripleBuffer<Looked> looked;
 
-  /// The obstacles as they are seen now; from any thread. The same points again are no change.
+  /// Sets the present obstacles; from any thread. The same points again are no change.
   void set_obstacles(const Obstacles& obstacles);
   /// The newest obstacles if their number is not `seen`, which it becomes; else null.
   std::shared_ptr<const Obstacles> newer_obstacles(std::uint64_t& seen) const;
 
-  /// For who asks beside the loop: what the last search found, and the timed path that is followed.
+  /// For callers beside the loop: the result of the last search, and the timed path that is followed.
   void show(Plan plan);
   void show(std::shared_ptr<const TimedPath> route, std::uint64_t number);
   Plan last_plan() const;

@@ -43,51 +43,47 @@ const std::vector<Field<PlannerSettings>>& fields();
 /// and LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed)
 /// unless the time runs out.
 ///
-/// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what
-/// it moves. Seven of ten samples are uniform within the limits, the others around a node. Both trees grow as far as
-/// they can, the one towards the sample, the other towards where that led. A node that was trapped grows by steps of
-/// random length.
+/// Distances in the trees are √Σ (w_i Δq_i)², with w_i the reach of joint i over the mean reach. Seven of ten samples are
+/// uniform within the limits, the others around a node. Both trees grow as far as they can: one towards the sample, the other
+/// towards the end of the first. A node that was trapped grows by steps of random length.
 ///
-/// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps
-/// `margin` is looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th,
-/// and what was found is shortened and widened. What a path keeps is stated in the plan; near start and goal every link
-/// may be as near to things as it is there, see Margins. A link deeper than `allowance` inside something at an end is
-/// refused as in collision.
+/// The first path keeps the `floor`: such paths are many, and found soonest. It is then improved: a path that keeps `margin` is
+/// searched with a 400th of the budget, otherwise one that keeps the geometric mean of the two with a 40th, and the result is
+/// shortened and widened. The plan states the margin that its path keeps; near start and goal every link may be as close to
+/// obstacles as it is there, see Margins. A start or goal with a link deeper than `allowance` in something is in collision.
 class RrtConnect {
  public:
   /// The body must outlive the planner, which is mutable: one per thread.
   RrtConnect(const ClearanceQuery& body, const PlannerSettings& settings);
 
-  /// A start or goal a rounding error outside the position limits is taken in: the path has the nearest one within.
+  /// A start or goal outside the position limits by rounding is replaced by the nearest one inside.
   Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
 
-  /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the
-  /// floor.
+  /// The two parts of a plan: the first path, then a better one. margin [m] replaces that of the settings; at least the floor.
   Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
   void improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin);
 
-  /// Ends what is under way once it says so: as if time ran out in `find`, with what there is by then in `improve`.
+  /// Sets a predicate that ends `find` as if time ran out, and `improve` with its result so far.
   void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
 
   const PlannerSettings& settings() const noexcept { return settings_; }
   const ClearanceQuery& body() const noexcept { return *body_; }
   ClearanceQuery::Workspace& workspace() noexcept { return workspace_; }
 
-  /// Whether an item is deeper than its allowance inside something at q; then what.
+  /// Whether an item is deeper than its allowance inside something at q; writes what.
   bool obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction);
 
-  /// The margins between two ends: of this distance, and less where an end asks for less.
+  /// Margins between two ends: this distance, and less near an end that has less.
   Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles);
 
-  /// Whether the straight way is free, with this margin [m] but for its ends.
+  /// Whether the straight way is free with this margin [m], except near its ends.
   bool sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles);
 
-  /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none
-  /// is.
+  /// Makes a path (nv × W) begin `here`, straight to its last visible waypoint, from `first` on. False if none is visible.
   bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here, const Obstacles& obstacles);
 
  private:
-  /// By how much an item may be below zero at an end [m].
+  /// Largest depth of an item at an end [m].
   double allowance(int item) const noexcept;
   enum class Growth { trapped, advanced, reached };
 

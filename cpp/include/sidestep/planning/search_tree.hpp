@@ -6,8 +6,8 @@
 
 namespace sidestep {
 
-/// A tree of configurations with the nearest of them found by a scan, which at some thousands of nodes is as fast as an
-/// index. Joints count by their weights w: |Δq| = √Σ (w_i Δq_i)². Memory is taken once.
+/// A tree of configurations. The nearest node is found by a scan, which for some thousands of nodes is as fast as an index.
+/// Distances are weighted by joint: |Δq| = √Σ (w_i Δq_i)². Memory is allocated once.
 class SearchTree {
  public:
   /// weights: (nv), not negative; 0 for a joint that moves nothing.
@@ -26,7 +26,7 @@ class SearchTree {
   /// |q − node|, weighted.
   double distance(int k, const Eigen::VectorXd& q) const noexcept { return (q - nodes_.col(k)).cwiseProduct(weights_).norm(); }
 
-  /// How far from a node samples may be that it is the nearest to: infinitely until `bound` [rad | m].
+  /// Largest distance of samples whose nearest node this is [rad | m]; infinite until `bound`.
   double domain(int k) const noexcept { return domains_[static_cast<std::size_t>(k)]; }
   bool bounded(int k) const noexcept { return std::isfinite(domain(k)); }
   void bound(int k, double distance) noexcept { domains_[static_cast<std::size_t>(k)] = distance; }

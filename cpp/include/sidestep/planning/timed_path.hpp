@@ -21,12 +21,12 @@ struct TimedPathSettings {
 template <>
 const std::vector<Field<TimedPathSettings>>& fields();
 
-/// What a path may ask of the joints of a robot: `speed` of their velocity and acceleration limits, less 5 % that are left to
-/// an arm that follows, and no velocity from which a joint moves on by more than 1.5 rad while it stops; jerk 88/s times the acceleration limit,
-/// which stays below 100/s between samples. Joints without a limit: 2 rad/s, 10 rad/s² (m, alike).
+/// Limits of a path on the joints of a robot: `speed` times their velocity and acceleration limits, less 5 % for feedback, and
+/// no velocity from which a joint needs more than 1.5 rad to stop. Jerk: 88/s times the acceleration limit, which stays below
+/// 100/s between samples. Joints without a limit: 2 rad/s, 10 rad/s² (or m).
 PathLimits path_limits(const JointLimits& limits, double speed);
 
-/// A path as a motion: where the reference is at which time, and how narrow the path is.
+/// A path as a motion: the reference over time, and the clearance along the path.
 struct TimedPath {
   PathTiming motion;
   Eigen::MatrixXd places;         ///< Configurations (nv × P), 0.05 rad apart.
@@ -39,22 +39,22 @@ struct TimedPath {
   Eigen::Index place_after(double station) const noexcept;
 };
 
-/// Times a path, as fast as the limits allow, from a velocity v (nv) of which what leads along the path counts.
+/// Times a path, as fast as the limits allow, from the part of a velocity v (nv) that leads along the path.
 ///
-/// Near obstacles the rule of ClearanceConstraints bounds the speed: with h_i the clearance of an item, whose distance left is s = h_i − margin (at least
-/// 1 mm; where the path itself comes nearer than the margin, that), and A = braking_fraction |dh_i/ds| (d²s/dt²)_max, the speed
-/// along the path is at most p⁻¹(s) / |dh_i/ds| where h_i shrinks. A path that is not `measured` is slow everywhere, and
-/// soon made: clearances are looked at nowhere.
+/// Near obstacles the rule of ClearanceConstraints bounds the speed. Let h_i be the clearance of an item, s = h_i − margin its
+/// distance left (at least 1 mm; the margin is smaller where the path itself comes closer) and
+/// A = braking_fraction |dh_i/ds| (d²s/dt²)_max. Where h_i shrinks, the speed along the path is at most p⁻¹(s) / |dh_i/ds|. A path
+/// that is not `measured` is slow everywhere but quickly made: it needs no clearances.
 ///
-/// With the dynamics of an arm that is moved by torque, accelerations along the path take no more than 0.7 of the effort that
-/// gravity leaves, and their changes no more than 0.5 of the effort's rate: at a place with s̈, s⃛ what the joints' limits allow,
+/// With the dynamics of an arm that is moved by torque, accelerations along the path use at most 0.7 of the effort that gravity
+/// leaves, and their changes at most 0.5 of the effort's rate. With s̈, s⃛ at a place by the joint limits,
 ///     |M q'| s̈ share <= 0.7 (effort − |g|),     |M q'| s⃛ share_of_jerk <= 0.5 effort rate,
 /// the first with a share for each place (at least 0.05), the second with one for the path. Centrifugal forces are not counted.
 TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const ClearanceQuery& body, const Obstacles& obstacles,
                      const TimedPathSettings& settings, const SafetySettings& safety, ClearanceQuery::Workspace& workspace,
                      bool measured = true, const RigidBodyDynamics* dynamics = nullptr);
 
-/// Where the reference is on a timed path: at a time of the motion, which goes more slowly as the reference gets ahead of the arm.
+/// Place of the reference on a timed path: a time of the motion, which runs slower as the reference gets ahead of the arm.
 struct TimedPathFollower {
   double time = 0.0;     ///< Time of the motion [s].
   double pace = 1.0;     ///< Pace r of that time, in [0, 1].
@@ -62,12 +62,12 @@ struct TimedPathFollower {
   double station = 0.0;  ///< Station at that time [rad].
   double most = 1.0;     ///< Largest r allowed, >= 0.
 
-  /// Onto a new path, at the sample nearest to q in the first radian, as fast as the arm moves along it at v (nv).
+  /// Enters a new path, at the sample nearest to q in the first radian, with the speed of v (nv) along it.
   void enter(const TimedPath& route, ConstVectorRef q, ConstVectorRef v) noexcept;
 
   static constexpr Eigen::Index most_places = 5;  // Most narrow places that are passed on.
-  /// The narrow places between the reference and as far behind it as the arm may be, or every second, third, … of them:
-  /// writes them into the columns of (nv × most_places), and says how many they are.
+  /// Writes the narrow places between the reference and the farthest place of the arm behind it, or every second, third, … of
+  /// them, into the columns of (nv × most_places). Returns their number.
   Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings,
                       Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 

@@ -40,7 +40,7 @@ class RigidBodyDynamics {
   /// invalid inertia or a gravity that is not finite.
   RigidBodyDynamics(Robot robot, std::vector<Inertial> inertials, const Eigen::Vector3d& gravity = standard_gravity);
 
-  /// What the recursions write to, allocated once. One per thread.
+  /// Memory of the recursions, allocated once. One per thread.
   class Workspace {
    public:
     explicit Workspace(const RigidBodyDynamics& dynamics);
@@ -71,11 +71,11 @@ class RigidBodyDynamics {
   /// The same from a state of this robot that is up to date.
   void mass_matrix(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::MatrixXd> mass) const noexcept;
   void bias(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
-  /// The part of the bias that is there at rest: g (nv) [Nm | N]. No allocation.
+  /// Gravity part of the bias, g (nv) [Nm | N]. No allocation.
   void gravity(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
 
  private:
-  /// The coordinates' forces of the bodies' forces, which are added up along the tree.
+  /// Projects the bodies' forces, summed along the tree, onto the coordinates.
   void project(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
 
   Robot robot_;

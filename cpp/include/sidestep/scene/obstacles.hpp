@@ -22,8 +22,8 @@ class Obstacles {
   /// 1. Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
   Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities);
 
-  /// The same with the points in the order that queries use, see PointTree::order: as they were when points that have moved since
-  /// were given. For recordings. Throws also where that is none of these points.
+  /// The same points, in a given order of the tree, see PointTree::order. For recordings, whose points may have moved since
+  /// the tree was built. Also throws if the order is no permutation of the points.
   static Obstacles in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
                             std::vector<int> order);
 
@@ -43,29 +43,29 @@ class Obstacles {
   const Eigen::VectorXd& radii() const noexcept { return radii_; }
   const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
 
-  /// The same points with the names of what they belong to: the first counts[0] points to names[0], and so on; an empty
-  /// name is none. Copies share the names. Throws std::invalid_argument unless there are as many counts as names, none
-  /// negative, and together as many as points.
+  /// The same points with names of their obstacles: the first counts[0] points belong to names[0], and so on; an empty name is
+  /// none. Copies share the names. Throws std::invalid_argument unless there are as many counts as names, none negative, and
+  /// their sum is the number of points.
   Obstacles named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const;
 
-  /// Of what belongs together, in the order of the points: its name, empty where it has none, and how many.
+  /// Name (empty: none) and number of points of each obstacle, in the order of the points.
   std::vector<std::pair<std::string, Eigen::Index>> groups() const;
 
-  /// Name of what a point belongs to; empty where it has none or there is no such point.
+  /// Name of the obstacle of a point; empty if it has none or there is no such point.
   std::string_view name_of(Eigen::Index point) const noexcept;
 
-  /// What messages call it: "'table'" by its name, or "obstacle point 3" where it has none; "an obstacle" if there is
-  /// no such point.
+  /// Words of messages for the obstacle of a point: "'table'" by its name, "obstacle point 3" without a name, "an obstacle" if
+  /// there is no such point.
   std::string words_for(Eigen::Index point) const;
 
   /// The same points in the order and under the hierarchy that queries use; built at construction.
   const PointTree& tree() const noexcept { return tree_; }
 
-  /// Another number whenever points or radii may be others; copies keep it. For what is remembered about obstacles.
+  /// Version number: changes whenever points or radii may have changed; copies keep it. For caches.
   std::uint64_t version() const noexcept { return version_; }
 
-  /// Moves every point along its velocity: x += s * duration. False where the duration, or where that takes a point, is
-  /// not finite: then none moves. No allocation.
+  /// Moves every point along its velocity, x += s * duration. False, and no point moves, if the duration or a result is not
+  /// finite. No allocation.
   bool advance(double duration) noexcept;
 
  private:

@@ -11,7 +11,7 @@
 
 namespace sidestep {
 
-/// Points under a hierarchy of bounding balls and boxes, so that a query looks at those near it only.
+/// Points under a hierarchy of bounding balls and boxes, so that a query visits only points near it.
 ///
 /// The points are sorted by halving them across the axis along which they spread most, and kept as structure of arrays,
 /// padded to whole leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive
@@ -19,8 +19,8 @@ namespace sidestep {
 /// outside the control loop; moving the points refits the balls in place.
 class PointTree {
  public:
-  static constexpr int leaf_size = 16;
-  static constexpr int fan_out = 16;
+  static constexpr int leaf_size = 16;  // Points of a leaf.
+  static constexpr int fan_out = 16;    // Nodes below a node.
   static_assert(fan_out == leaf_size);  // one measurement holds as many nodes as points, as bits of half a word
 
   /// Holds the balls of all points below.
@@ -47,8 +47,8 @@ class PointTree {
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
   static constexpr double padding = 1e9;  ///< Coordinate of padding points [m], beyond every reach.
 
-  /// Of the leaves, around the same centres; leaf k holds the points from k `leaf_size` on. Not of a tree without
-  /// points.
+  /// Balls of the leaves, with the centres of their boxes; leaf k holds the points from k `leaf_size` on. Not for a tree
+  /// without points.
   Balls leaf_balls() const noexcept { return levels_.front().balls(); }
   Boxes leaf_boxes() const noexcept { return levels_.front().boxes(); }
 
@@ -57,12 +57,13 @@ class PointTree {
     int point;  ///< Index in tree order; -1: none.
   };
 
-  /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
-  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that space, and returns
-  /// those below `limit` as bits; measure(Boxes, ...) the same of boxes, which must not exceed that of a ball inside by
-  /// more than what it is content to miss. (Boxes lie close to walls; balls around many of their points would reach far
-  /// out.) The arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop`
-  /// ends the search. No allocation.
+  /// The point whose ball is nearest by a measure, searched best first.
+  ///
+  /// measure(Balls, first, count, limit, values) writes the distances of balls [first, first + count), at most `leaf_size`,
+  /// into `values` and returns those below `limit` as bits. measure(Boxes, ...) does the same for boxes; their distance may
+  /// exceed that of a ball inside only by an error that the caller accepts. (Boxes lie close to walls, while balls around many
+  /// of their points would reach far out.) Arrays extend for `leaf_size` from `first`. Points from `limit` on are not found;
+  /// any point below `stop` ends the search. No allocation.
   template <class Measure>
   Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
     Nearest found{limit, -1};
@@ -79,13 +80,14 @@ class PointTree {
   /// Stops every point.
   void freeze() noexcept;
 
-  /// A measure of each of up to `fan_out` nodes.
+  /// Measures of up to `fan_out` nodes.
   using Bounds = std::array<float, fan_out>;
 
-  /// Calls leaves(first, bits) with every group of leaves of which some matter, as do all nodes above them; of a node
-  /// those first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first,
-  /// first + count), of which arrays go on for `fan_out` from `first`, and returns those that matter as bits, what
-  /// leaves(...) gets; in the upper half of the word there may be more. No allocation.
+  /// Calls leaves(first, bits) for every group of leaves with some that matter, nodes of the smallest measure first.
+  ///
+  /// measure(Balls, Boxes, first, count, Bounds&) measures the nodes [first, first + count), whose arrays extend for `fan_out`
+  /// from `first`, and returns those that matter as bits. leaves(...) gets these bits; the upper half of the word may hold
+  /// more. No allocation.
   template <class Measure, class Leaves>
   void visit(Measure&& measure, Leaves&& leaves) const noexcept {
     if (!levels_.empty()) {
@@ -101,8 +103,8 @@ class PointTree {
   struct Level {
     int size;
     std::array<std::vector<double>, 3> centre, half;  // Centres and half sizes of the boxes around the points.
-    std::vector<double> largest;                      // radius of a point
-    std::vector<double> radius;                       // of the balls
+    std::vector<double> largest;                      // Largest radius of a point.
+    std::vector<double> radius;                       // Radii of the balls.
 
     explicit Level(int count);
     Boxes boxes() const noexcept {
@@ -191,8 +193,8 @@ class PointTree {
   }
 
   std::vector<int> order_;
-  std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
-  std::vector<Level> levels_;                   // leaves first, one node last
+  std::array<std::vector<double>, 7> columns_;  // Columns x, y, z, radius, velocity.
+  std::vector<Level> levels_;                   // Levels of the tree: leaves first, one node last.
   double fastest_ = 0.0, common_radius_ = -1.0;
 };
 

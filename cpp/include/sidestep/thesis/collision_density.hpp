@@ -40,7 +40,7 @@ class CollisionDensity final : public Embedding {
   bool measures_distances() const noexcept override { return true; }
 
  private:
-  struct Gaussians;  // of links that a joint moves, those of the last joint first
+  struct Gaussians;  // Gaussians of the links that a joint moves, those of the last joint first.
 
   bool average_;
   std::shared_ptr<const Gaussians> gaussians_;

@@ -8,11 +8,11 @@
 
 namespace sidestep {
 
-/// How a step of length dt is taken.
+/// Integration scheme of a step of length dt.
 enum class Integrator {
-  semi_implicit_euler,  ///< v ← v + a dt, q ← q + v dt
-  second_order,         ///< q ← q + v dt + ½ a dt², v ← v + a dt (the thesis's update, 6.2.1); of first order, as v is
-  runge_kutta_4,        ///< the classical scheme on (q, v), with the obstacles moved along
+  semi_implicit_euler,  ///< Semi-implicit Euler: v ← v + a dt, q ← q + v dt.
+  second_order,         ///< The thesis's update (6.2.1): q ← q + v dt + ½ a dt², v ← v + a dt; of first order, as v is.
+  runge_kutta_4,        ///< The classical scheme on (q, v), with the obstacles moved along.
 };
 
 struct RolloutSettings {
@@ -27,14 +27,14 @@ struct RolloutSettings {
 struct Rollout {
   Eigen::VectorXd time;                ///< Times [s].
   Eigen::MatrixXd q, v, acceleration;  ///< States and accelerations (steps + 1, nv).
-  Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back.
+  Eigen::MatrixXd values;              ///< Values ψ (steps + 1, m), NaN where the step fell back.
   Eigen::MatrixXd switch_weights;      ///< Switch weights (steps + 1, nv), NaN likewise.
   std::vector<StepStatus> statuses;    ///< Status of each row.
   Eigen::VectorXd step_seconds;        ///< Computing time of each row's acceleration [s]; empty if not measured.
 };
 
-/// Integrates the system alone from (q, v), obstacles and goal moving at their velocities: nothing holds limits or
-/// clearances. What has to keep them is a Controller, see `integrate`.
+/// Integrates the system alone from (q, v), with obstacles and goal at constant velocity. Nothing enforces limits or clearances;
+/// a Controller does, see `integrate`.
 /// Throws std::invalid_argument on sizes, a period or number of steps that is not positive, and a record of more than
 /// 8 GiB; Interruption if interrupted.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Goal goal,

@@ -3,7 +3,7 @@
 // Sums of outer products, once per instruction set. Plain arrays only, see kinematics_kernel.hpp.
 namespace sidestep::kernels {
 
-/// Beyond the last column so many numbers are read, and make no difference.
+/// Numbers that are read beyond the last column, without effect.
 inline constexpr int gram_room = 8;
 
 /// Adds Σ_a c_a c_aᵀ to the lower triangle of a matrix, columns `stride` apart, for `num` columns c_a of `rows`

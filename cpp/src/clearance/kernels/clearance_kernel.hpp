@@ -30,8 +30,8 @@ struct LinkMotion {
 // twists.
 inline constexpr int approach = 20, sums = 30;
 
-inline constexpr int most_points = 16;  // of a leaf
-inline constexpr int most_candidates = 512;
+inline constexpr int most_points = 16;       // Most points of a leaf.
+inline constexpr int most_candidates = 512;  // Most candidate points of an ellipsoid.
 
 /// Points that may weigh in the means of an ellipsoid, with what single precision says of them.
 struct Candidates {
@@ -58,14 +58,14 @@ struct Query {
   Candidates candidates;
 };
 
-inline constexpr int most_queries = 16;
+inline constexpr int most_queries = 16;  // Most ellipsoids of a group.
 
 // Of every ellipsoid: link frame to principal axes by rows (9), squared semi-axes (3), semi-axes (3), and the smallest
 // radius of curvature of its surface.
 inline constexpr int squared_at = 9, semi_at = 12, roundness_at = 15, principal_numbers = 16;
 
-inline constexpr int most_leaves = 64;
-// Columns of their points are not 4 KiB apart, where loads wait for stores to other columns.
+inline constexpr int most_leaves = 64;  // Most leaves of a group.
+// Distance between columns of points in memory: no multiple of 4 KiB, where loads wait for stores to other columns.
 inline constexpr int points_apart = most_leaves * most_points + 5 * most_points;
 
 /// Leaves that may matter to ellipsoids of a group, in single precision, seen from its origin.
@@ -82,7 +82,7 @@ struct Leaves {
   float own[3][points_apart];  // velocity, where points move
 };
 
-inline constexpr int most_loose = 256;
+inline constexpr int most_loose = 256;  // Most points of wide leaves.
 
 /// Points of leaves so wide that all of one says little of a point, in single precision, seen from the origin of a
 /// group.

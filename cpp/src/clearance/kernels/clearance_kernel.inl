@@ -10,7 +10,7 @@ namespace {
 
 #include "point_tree_bounds.inl"
 
-// Of roots, and so of distances and speeds relative to the larger ones that they come from.
+// Error of roots, and so of distances and speeds, relative to the larger ones that they come from.
 constexpr float measure_error = 3.0f * rough_error;
 
 /// What is known of balls around places: the distance of a place, and h and h + τ h' of what is within, at least. A way

@@ -1,13 +1,13 @@
 // Included by clearance_kernel.inl: points in double precision, summed.
 
-// Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
+// Offset that stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
 
-// S is 1 at the foot of the perpendicular. From within the first a step that leaves the third power ends within the
-// second of nearly round ellipsoids, and from there on the square is below rounding.
+// Errors of S, which is 1 at the foot of the perpendicular. From within the first, a step that leaves the third power ends
+// within the second for nearly round ellipsoids; from there on the square is below rounding.
 constexpr double cubic_within = 5e-3, polished_within = 1e-7;
-constexpr int most_iterations = 16;
-constexpr int together = 4;  // registers
+constexpr int most_iterations = 16;  // Most Newton iterations.
+constexpr int together = 4;  // Registers handled together.
 
 /// As many of the lanes as there are, as bits.
 inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }

@@ -14,7 +14,7 @@ struct PlacedEllipsoid {
   double extent;      // the longest [m]; 0: a point
 };
 
-inline constexpr int most_balls = 16;  // of one call; the arrays go on for so many from `first`
+inline constexpr int most_balls = 16;  // Most balls of one call; the arrays extend for as many from `first`.
 
 /// Write lower bounds of the signed distances from the ellipsoid to the balls, or boxes, [first, first + count) into
 /// `distances` (most_balls); bit i of the result: that of first + i is below `limit`. Those that are not may be coarse.

@@ -4,10 +4,10 @@
 namespace sidestep::kernels {
 namespace {
 
-constexpr int refinements = 2;          // a median error of 10⁻⁴ of the distance for axes 1 : 6
-constexpr float inside = -0.999f;       // of the least square: t stays above its pole
-constexpr float tiny = 1e-20f;          // in place of zero, below a fraction line
-constexpr float centre_offset = 1e-6f;  // [m] stands for the centre, where no direction is the nearest
+constexpr int refinements = 2;  // Newton steps: they leave a median error of 10⁻⁴ of the distance for axes 1 : 6.
+constexpr float inside = -0.999f;  // Smallest t as a share of the least squared axis: t stays above its pole.
+constexpr float tiny = 1e-20f;  // Divisor that stands for zero.
+constexpr float centre_offset = 1e-6f;  // Offset that stands for the centre, which has no nearest direction [m].
 
 /// `count` numbers side by side.
 template <class T, int count>
@@ -203,7 +203,7 @@ unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes
 
 unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, double limit,
                             float* distances) noexcept {
-  constexpr int half = most_balls / 2;  // a node of the tree has as many below it, the top of it more
+  constexpr int half = most_balls / 2;  // Balls below a node of the tree; the top of it has more.
   const float least = static_cast<float>(limit);
   if (count <= half) {
     return distances_to_boxes<Floats<half>>(ellipsoid, boxes, first, count, least, distances);

@@ -6,12 +6,12 @@ namespace {
 
 #include "../../math/kernels/simd.inl"
 
-constexpr int most_steps = 16;
-constexpr int most_halvings = 8;
-// Of the slope of φ across n, relative to the lengths in it: n is as good, and h to the square of that.
+constexpr int most_steps = 16;  // Most Newton steps.
+constexpr int most_halvings = 8;  // Most halvings of a step.
+// Slope of φ across n at which the search ends, relative to the lengths in it: n is as accurate, and h to the square of that.
 constexpr double accuracy = 1e-12;
-constexpr double rounding = 1e-15;  // of φ, relative to the lengths in it
-// Centres closer than this have no direction between them [m]; such ellipsoids overlap deeply anyway.
+constexpr double rounding = 1e-15;  // Rounding of φ, relative to the lengths in it.
+// Distance of centres below which they have no direction [m]; such ellipsoids overlap deeply anyway.
 constexpr double closest_centres = 1e-6;
 
 inline Lanes dot(const Lanes* a, const Lanes* b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }

@@ -2,6 +2,6 @@
 
 namespace sidestep::kernels {
 
-inline constexpr int most_lanes = 8;  // doubles in the widest register
+inline constexpr int most_lanes = 8;  // Doubles in the widest register.
 
 }  // namespace sidestep::kernels

@@ -6,7 +6,7 @@ namespace {
 
 #include "simd.inl"
 
-// As many as two units with a latency of four or five cycles take, and registers hold.
+// Independent chains: as many as two units with a latency of four or five cycles take, and registers hold.
 constexpr int chains = 12;
 
 int multiply_add(long rounds, double& result) noexcept {

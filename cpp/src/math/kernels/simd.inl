@@ -163,7 +163,7 @@ inline unsigned below(Lanes x, Lanes limit) noexcept {
 #endif
 }
 
-// Twice as many floats side by side.
+// Floats in a register.
 inline constexpr int singles = 2 * width;
 typedef float Singles __attribute__((vector_size(4 * singles)));
 
@@ -212,7 +212,7 @@ inline Singles magnitude(Singles x) noexcept {
 
 /// 1/x and 1/√x of positive numbers, within this share of them: 2⁻¹⁴ or 3 · 2⁻¹³ (NEON, after a step of Newton's: 2⁻¹⁵).
 #if defined(__AVX512F__)
-inline constexpr float rough_error = 6.2e-5f;
+inline constexpr float rough_error = 6.2e-5f;  // Relative error of 1/x and 1/√x.
 #else
 inline constexpr float rough_error = 3.7e-4f;
 #endif

@@ -19,7 +19,7 @@ struct JointModel {
   bool straight;  // (x, y, axis) is the child's frame
 };
 
-/// Joints at a time whose sines and cosines are taken together.
+/// Joints whose sines and cosines are computed together.
 inline constexpr int joint_block = 4;
 
 /// Writes the links of joints [0, num), `stride` doubles apart, at q and v. The joints go on to whole blocks.

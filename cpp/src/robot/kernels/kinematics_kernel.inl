@@ -75,7 +75,7 @@ inline double position(const JointModel& joint, const double* q) noexcept {
   return joint.multiplier * q[joint.coordinate] + joint.offset;
 }
 
-// Of a turned joint's x and y, until its link is written there.
+// Places of the x and y axes of a turned joint, until its link is written there.
 constexpr int turned_x = 0, turned_y = 4;
 
 /// Writes the x and y of every joint, turned, in the parent's frame. A loop of its own, so that what goes on from link

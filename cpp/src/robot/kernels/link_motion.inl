@@ -1,6 +1,6 @@
 // Included inside an anonymous namespace, after kinematics_kernel.inl's Vector. How a link moves with its joint.
 
-// Beyond this angle [rad] the multiples of π/2 below are no longer exact.
+// Largest angle [rad]: beyond, the multiples of π/2 below are no longer exact.
 constexpr double largest_angle = 1e5;
 
 template <class Numbers>

@@ -9,8 +9,8 @@ namespace {
 #include "../../math/kernels/simd.inl"
 #include "../../math/kernels/vectors.inl"
 
-constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // 1/(2π)³
-constexpr double least_exponent = -700.0;                          // below it a density is no normal number: taken as zero
+constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // The number 1/(2π)³.
+constexpr double least_exponent = -700.0;  // Smallest exponent: below, a density is no normal number and taken as zero.
 
 /// Gaussians of a block side by side, from one on.
 struct SideBySide {
@@ -168,7 +168,7 @@ struct Added {
   Vectors force = {}, moment = {};  // the wrench about the world origin
 
   void add(const GatheredLinks& link, const SideBySide& gaussians, const DensityPoints& points) noexcept {
-    constexpr int together = 4;  // points at a time
+    constexpr int together = 4;  // Points handled together.
     const GaussianBlock& g = gaussians.gaussians;
     const Vectors mean{gaussians(g.mean[0]), gaussians(g.mean[1]), gaussians(g.mean[2])};
     for (int start = 0; start < points.num; start += together) {
