@@ -366,7 +366,7 @@ BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
   }
 }
 
-// More than there is room for, before a point within reach is found beside which they weigh.
+// More points than fit, before a point within reach is found beside which they weigh.
 BOOST_AUTO_TEST_CASE(walls_just_beyond_the_reach_count_beside_what_is_within) {
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;

@@ -420,7 +420,7 @@ BOOST_AUTO_TEST_CASE(unusable_clearances_are_noticed) {
   BOOST_TEST(!rows.usable(short_of_rates));
 }
 
-BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
+BOOST_AUTO_TEST_CASE(settings_of_clearance_constraints_are_checked) {
   const auto message_of = [](auto&& change) {
     SafetySettings settings;
     change(settings);

@@ -227,8 +227,10 @@ BOOST_AUTO_TEST_CASE(poses_are_reached_in_a_free_workspace) {
   Random random(3);
   const auto draw = [&] { return Eigen::VectorXd::NullaryExpr(nv, [&](Eigen::Index) { return random.uniform(-2.3, 2.3); }); };
   const ClearanceQuery body(robot, arm.body(), arm.pairs());
-  ClearanceQuery::Workspace room(body);
-  const auto free = [&](const Eigen::VectorXd& q) { return body.nearest(q, Obstacles::none(), 0.1, room).clearance > 0.02; };
+  ClearanceQuery::Workspace workspace(body);
+  const auto free = [&](const Eigen::VectorXd& q) {
+    return body.nearest(q, Obstacles::none(), 0.1, workspace).clearance > 0.02;
+  };
   int reached = 0;
   constexpr int num = 50;
   for (int k = 0; k < num; ++k) {

@@ -58,7 +58,7 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
     controller.set_goal(*goal);
   }
   const ClearanceQuery body(arm.robot(), arm.body());
-  ClearanceQuery::Workspace room(body);
+  ClearanceQuery::Workspace workspace(body);
   const SpeedLimitSettings limits = settings.speed_limits.value_or(SpeedLimitSettings{});
   Motion motion;
   Eigen::VectorXd q = start, v = Eigen::VectorXd::Zero(nv);
@@ -66,7 +66,7 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
     motion.allocations += test::allocations_of([&] { controller.step(q, v); });
     const Command& command = controller.command();
     const double speed = frames_at(arm.robot(), q, v).speed;
-    const double distance = body.nearest(q, controller.obstacles(), 10.0, room).clearance;
+    const double distance = body.nearest(q, controller.obstacles(), 10.0, workspace).clearance;
     BOOST_REQUIRE(std::abs(command.speed - speed) < 1e-12);
     if (settings.speed_limits) {
       BOOST_REQUIRE(command.speed_limit == limits.allowed(distance));

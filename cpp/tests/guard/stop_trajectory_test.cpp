@@ -21,7 +21,7 @@ struct Moving {
   Eigen::VectorXd q, v, a;
 };
 
-/// Anywhere within half of the position range, so that the limits of position leave room.
+/// Anywhere within half of the position range, so that the position limits do not bind.
 Moving random_state(Random& random, const JointLimits& limits) {
   Moving state{Eigen::VectorXd(nv), Eigen::VectorXd(nv), Eigen::VectorXd(nv)};
   for (Eigen::Index j = 0; j < nv; ++j) {

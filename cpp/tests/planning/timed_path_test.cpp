@@ -55,7 +55,7 @@ BOOST_AUTO_TEST_CASE(no_joint_moves_on_for_long_while_it_stops) {
   BOOST_TEST(limits.velocity[1] == 0.95 * 2.0, boost::test_tools::tolerance(1e-12));
 }
 
-BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_safety_rows_let_it) {
+BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_clearance_constraints_let_it) {
   ClearanceQuery::Workspace w(body);
   Eigen::MatrixXd path(2, 2);
   path << 0.0, 0.83, 0.0, 0.0;  // towards a ball beside the way, which is 1.6 cm off the ends of the links there
