@@ -10,7 +10,7 @@ PAGE = (ROOT / "docs" / "how-to" / "add-a-constraint.md").read_text(encoding="ut
 def test_the_guide_shows_the_class_that_is_tested() -> None:
     tested = (ROOT / "cpp/tests/constraints/own_constraint_test.cpp").read_text(encoding="utf-8")
     first = re.findall(r"```cpp\n(.*?)```", PAGE, re.DOTALL)[0]
-    shown = first[first.index("/// Keeps") :].strip()
+    shown = first[first.index("/// Keeps") : first.rindex("};") + 2]
     assert "class AbovePlane : public Constraint" in shown
     assert shown in tested
 

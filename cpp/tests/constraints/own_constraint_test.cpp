@@ -16,15 +16,21 @@ using test::nv;
 
 namespace {
 
-/// Keeps the origin of a frame above a horizontal plane: h = z − height ≥ 0.
+/// Keeps the origin of a frame above a horizontal plane: h = z − height ≥ margin.
 class AbovePlane : public Constraint {
  public:
-  AbovePlane(const Robot& robot, const Frame& frame, double height)
+  /// Throws std::invalid_argument if no joint moves the frame.
+  AbovePlane(const Robot& robot, const Frame& frame, double height, double margin)
       : robot_(robot),
         frame_(frame),
         height_(height),
+        margin_(margin),
         state_(robot),
-        gradient_(Eigen::VectorXd::Zero(robot.num_coordinates())) {}
+        gradient_(Eigen::VectorXd::Zero(robot.num_coordinates())) {
+    if (frame.joint < 0) {
+      throw std::invalid_argument("above plane: no joint moves frame '" + frame.name + "'");
+    }
+  }
 
   Priority priority() const noexcept override { return Priority::clearance; }
   int max_rows() const noexcept override { return 1; }
@@ -37,16 +43,16 @@ class AbovePlane : public Constraint {
     const Eigen::Vector3d bias = link.bias.linear + link.bias.angular.cross(p) + link.velocity.angular.cross(p_dot);
     gradient_.setZero();
     accumulate_generalised_force(state_, frame_.joint, {p.cross(up), up}, gradient_);  // ∂z/∂q
-    const double distance = p.z() - height_;
+    const double h = p.z() - height_;
     const ClosingLimits limits{1.0, 2.0, 20.0, 0.5};  // [m/s², m/s², 1/s, -]
-    rows.at_least(gradient_, demanded_deceleration(distance, -p_dot.z(), limits, now.period) - bias.z(),
-                  std::max(-distance, 0.0));
+    const double least = demanded_deceleration(h - margin_, -p_dot.z(), limits, now.period) - bias.z();
+    rows.at_least(gradient_, least, std::max(-h, 0.0));
   }
 
  private:
   Robot robot_;
   Frame frame_;
-  double height_;
+  double height_, margin_;
   KinematicState state_;
   Eigen::VectorXd gradient_;
 };
@@ -73,9 +79,9 @@ double least_height(const Robot& arm, MotionProgram& program) {
   return least;
 }
 
-MotionProgram::Constraints above(const Robot& arm, double height) {
+MotionProgram::Constraints above(const Robot& arm, double height, double margin) {
   MotionProgram::Constraints own;
-  own.push_back(std::make_unique<AbovePlane>(arm, arm.frames()[0], height));
+  own.push_back(std::make_unique<AbovePlane>(arm, arm.frames()[0], height, margin));
   return own;
 }
 
@@ -126,12 +132,35 @@ BOOST_AUTO_TEST_CASE(a_frame_stays_above_a_plane) {
   for (const bool by_torque : {true, false}) {
     MotionProgramSettings settings;
     settings.by_torque = by_torque;
-    MotionProgram without(arm, settings), with(arm, settings, above(arm, 1.2));
+    MotionProgram without(arm, settings), with(arm, settings, above(arm, 1.2, 0.005));
     BOOST_TEST(least_height(arm, without) < 1.0);
     const double least = least_height(arm, with);
-    BOOST_TEST(least >= 1.2 - 1e-6);  // terms of order T² of the arc
-    BOOST_TEST(least < 1.2 + 1e-3);   // the plane is reached, not more is kept
+    BOOST_TEST(least >= 1.205 - 1e-6);  // terms of order T² of the arc
+    BOOST_TEST(least < 1.205 + 1e-3);   // the margin is reached, not more is kept
   }
+}
+
+BOOST_AUTO_TEST_CASE(a_frame_that_no_joint_moves_is_refused) {
+  const Robot arm = test::serial_arm(test::arm_limits(nv));
+  Frame fixed = arm.frames()[0];
+  fixed.joint = -1;
+  BOOST_CHECK_THROW(AbovePlane(arm, fixed, 0.0, 0.0), std::invalid_argument);
+}
+
+BOOST_AUTO_TEST_CASE(one_row_is_appended_of_the_height_as_it_is) {
+  const Robot arm = test::serial_arm(test::arm_limits(nv));
+  AbovePlane constraint(arm, arm.frames()[0], 1e3, 0.005);  // the frame is far below
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q;
+  const LastCommand last{};
+  const SecondState second{};
+  const SpeedLimitNow speed{};
+  const Survey found{};
+  const Moment now{0.001, q, v, nullptr, nullptr, 1.0, false, last, nullptr, second, speed, found};
+  RowBlock rows(constraint.max_rows(), nv, constraint.priority());
+  Bounds bounds(nv);
+  constraint.append(now, bounds, rows);
+  BOOST_TEST(rows.size() == 1);
+  BOOST_TEST(rows.depths[0] > 990.0);  // the arm is no longer than 10 m
 }
 
 BOOST_AUTO_TEST_CASE(rows_of_ones_own_give_way_by_their_priority) {
