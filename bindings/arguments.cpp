@@ -86,7 +86,7 @@ void warn(const std::string& words) {
 }
 
 void raise_type(nb::handle value, const char* name, const char* allowed) {
-  constexpr std::size_t longest = 60;
+  constexpr std::size_t longest = 60;  // Longest text that a message shows in full.
   std::string given = nb::repr(value).c_str();
   if (given.size() > longest || given.find('\n') != std::string::npos) {
     given.clear();

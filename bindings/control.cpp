@@ -81,7 +81,7 @@ void bind_quadratic_program(nb::module_& m) {
       .def(
           "__init__",
           [](QuadraticProgram* self, int num_variables, int num_rows) {
-            constexpr int most = 4096;  // the matrices of a solve take 0.8 GB then
+            constexpr int most = 4096;  // Largest number: the matrices of a solve take 0.8 GB then.
             for (const int size : {num_variables, num_rows}) {
               if (size > most) {
                 throw nb::value_error(("quadratic program: a size is " + std::to_string(size) + ", must be at most 4096").c_str());

@@ -225,11 +225,11 @@ void bind_command(nb::module_& m) {
       });
 }
 
-constexpr const char* an_arm = "an Arm, such as Arm.load('fr3')";
+constexpr const char* an_arm = "an Arm, such as Arm.load('fr3')";  // Words of messages for the expected argument.
 
 /// Warns of what is implausibly large or heavy.
 void check_held(const Attachment& object) {
-  constexpr double largest = 5.0, heaviest = 500.0;  // [m], [kg]
+  constexpr double largest = 5.0, heaviest = 500.0;  // Largest plausible size [m] and mass [kg].
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (std::size_t k = 0; k < object.cover.centres.size(); ++k) {
     const Eigen::Vector3d reach = object.cover.shapes[k].rowwise().norm();

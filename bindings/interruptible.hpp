@@ -24,8 +24,8 @@ class SignalPoll {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds pause{50};
-  static constexpr std::chrono::milliseconds slow{1};  // between two looks at the clock
-  static constexpr int most_calls = 16;                // the same, where calls take less
+  static constexpr std::chrono::milliseconds slow{1};  // Time between two checks of the clock above which every call checks it.
+  static constexpr int most_calls = 16;                // Most calls between two checks, if they take less.
 
   bool is_main_, raised_ = false;
   int calls_ = 1, left_ = 1;

@@ -17,8 +17,8 @@
 namespace sidestep::python {
 namespace {
 
-constexpr std::size_t most_names = 4;
-constexpr double far = 100.0;  // [m] points of which none is nearer are warned of
+constexpr std::size_t most_names = 4;  // Most names that a message lists.
+constexpr double far = 100.0;  // Distance beyond which all points together cause a warning [m].
 
 /// Warns where no point is near, as of points in millimetres. The first that is near ends the search. Cameras may mark what they
 /// do not see by the largest number.

@@ -11,7 +11,7 @@ namespace sidestep::python {
 struct RecordingInProgress {
   Controller* controller;
   std::filesystem::path path;
-  std::optional<RecordingSummary> summary;  // once it has ended
+  std::optional<RecordingSummary> summary;  // Summary, once the recording has ended.
 
   RecordingSummary stop();
 };

@@ -45,9 +45,10 @@ class BackupManoeuvre {
 
   /// Replaces the wanted acceleration `a` (nv) [/s²] if no free stop follows it, and returns whether it did.
   ///
-  /// q, v: state; `last`: acceleration of the period before. If `a` changes faster than the limits allow, only the allowed share
-  /// of the change is made. If a free stop follows, that is the result. Otherwise it is the known stop, or one from here. `a`
-  /// stays as it is where there is none, and where the arm rests and no stop is known. `torque`: null for motion without torque.
+  /// q, v: state; `last`: acceleration of the period before; `torque`: null for motion without torque. If `a` changes faster than
+  /// the limits allow, only the allowed share of the change is made. If a free stop follows, that is the result. Otherwise it is
+  /// the known stop, or one from here. `a` passes unverified if no stop is known and it is within the limits, if the known stop is
+  /// over, and if there is no stop at all.
   bool keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
             const StopTorque* torque, Eigen::VectorXd& a) noexcept;
 
