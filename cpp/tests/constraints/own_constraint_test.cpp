@@ -159,7 +159,7 @@ BOOST_AUTO_TEST_CASE(one_row_is_appended_of_the_height_as_it_is) {
   RowBlock rows(constraint.max_rows(), nv, constraint.priority());
   Bounds bounds(nv);
   constraint.append(now, bounds, rows);
-  BOOST_TEST(rows.size() == 1);
+  BOOST_TEST(rows.size == 1);
   BOOST_TEST(rows.depths[0] > 990.0);  // the arm is no longer than 10 m
 }
 

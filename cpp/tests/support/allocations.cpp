@@ -3,11 +3,11 @@
 #include <cerrno>
 #include <cstdlib>
 
-#if defined(__SANITIZE_ADDRESS__)
-#define SIDESTEP_ADDRESS_SANITIZER
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SIDESTEP_SANITIZER
 #elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define SIDESTEP_ADDRESS_SANITIZER
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SIDESTEP_SANITIZER
 #endif
 #endif
 
@@ -19,7 +19,7 @@ namespace sidestep::test {
 std::size_t num_allocations() noexcept { return allocations; }
 }  // namespace sidestep::test
 
-#if defined(SIDESTEP_ADDRESS_SANITIZER)
+#if defined(SIDESTEP_SANITIZER)
 
 // The sanitizer owns malloc, and offers a hook that sees every allocation. Declared here because not every compiler
 // package ships <sanitizer/allocator_interface.h>.
