@@ -150,7 +150,7 @@ BOOST_AUTO_TEST_CASE(a_frame_that_no_joint_moves_is_refused) {
 BOOST_AUTO_TEST_CASE(one_row_is_appended_of_the_height_as_it_is) {
   const Robot arm = test::serial_arm(test::arm_limits(nv));
   AbovePlane constraint(arm, arm.frames()[0], 1e3, 0.005);  // the frame is far below
-  const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q;
+  const Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   const LastCommand last{};
   const SecondState second{};
   const SpeedLimitNow speed{};

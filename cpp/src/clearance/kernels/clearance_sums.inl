@@ -7,7 +7,7 @@ constexpr double centre_offset = 1e-9;
 // within the second for nearly round ellipsoids; from there on the square is below rounding.
 constexpr double cubic_within = 5e-3, polished_within = 1e-7;
 constexpr int most_iterations = 16;  // Most Newton iterations.
-constexpr int together = 4;  // Registers handled together.
+constexpr int together = 4;          // Registers handled together.
 
 /// As many of the lanes as there are, as bits.
 inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }

@@ -4,9 +4,9 @@
 namespace sidestep::kernels {
 namespace {
 
-constexpr int refinements = 2;  // Newton steps: they leave a median error of 10⁻⁴ of the distance for axes 1 : 6.
-constexpr float inside = -0.999f;  // Smallest t as a share of the least squared axis: t stays above its pole.
-constexpr float tiny = 1e-20f;  // Divisor that stands for zero.
+constexpr int refinements = 2;          // Newton steps: they leave a median error of 10⁻⁴ of the distance for axes 1 : 6.
+constexpr float inside = -0.999f;       // Smallest t as a share of the least squared axis: t stays above its pole.
+constexpr float tiny = 1e-20f;          // Divisor that stands for zero.
 constexpr float centre_offset = 1e-6f;  // Offset that stands for the centre, which has no nearest direction [m].
 
 /// `count` numbers side by side.

@@ -6,7 +6,7 @@ namespace {
 
 #include "../../math/kernels/simd.inl"
 
-constexpr int most_steps = 16;  // Most Newton steps.
+constexpr int most_steps = 16;    // Most Newton steps.
 constexpr int most_halvings = 8;  // Most halvings of a step.
 // Slope of φ across n at which the search ends, relative to the lengths in it: n is as accurate, and h to the square of that.
 constexpr double accuracy = 1e-12;

@@ -4,7 +4,7 @@
 constexpr float distance_error = 3.0f * rough_error, direction_error = 6.0f * rough_error;
 // Turn of the direction up to which t is near its value at the centre of a leaf, and its change there.
 constexpr float most_turn = 0.6f;
-constexpr int loose_steps = 2;  // Newton steps without a starting value.
+constexpr int loose_steps = 2;                        // Newton steps without a starting value.
 constexpr float least_height = 1e-9f, tiny = 1e-30f;  // Divisors that stand for zero.
 
 /// What does not depend on leaves, for all ellipsoids: their principal axes in the world, and how they move.
