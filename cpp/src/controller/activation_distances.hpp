@@ -49,7 +49,7 @@ class ActivationDistances {
   GeometricSystem::Workspace workspace_;
   Eigen::MatrixXd lowered_places_;
   Eigen::Index num_lowered_ = -1;
-  std::uint64_t lowered_version_ = 0;  // of obstacles
+  std::uint64_t lowered_version_ = 0;  // Version of the obstacles.
 };
 
 }  // namespace sidestep

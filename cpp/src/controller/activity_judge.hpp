@@ -24,14 +24,14 @@ class ActivityJudge {
     const CurrentRequest& request;
     const Goal& destination;  // a goal that was set, or the motion of an input; only where there is a request
     const GoalFollower& goal;
-    const Goal* followed;  // by which the reference is led
+    const Goal* followed;  // Goal by which the reference is led.
     const MeasuredState& arm;
-    const KinematicState& kinematics;  // of the arm
+    const KinematicState& kinematics;  // State of the arm.
     StepStatus attraction;
     double time = 0.0;
-    bool stale = false, fresh = false;  // the obstacles are old; the velocity or twist is not
-    bool under_way = false;             // a trajectory has not ended
-    bool waits = false;                 // for its path to be free
+    bool stale = false, fresh = false;  // Obstacles are old; velocity or twist is fresh.
+    bool under_way = false;             // A trajectory has not ended.
+    bool waits = false;                 // A trajectory waits for its path to be free.
   };
   struct Verdict {
     Activity activity;

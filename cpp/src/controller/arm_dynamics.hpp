@@ -57,7 +57,7 @@ class ArmDynamics {
   std::optional<RigidBodyDynamics> model_;
   std::optional<RigidBodyDynamics::Workspace> workspace_;
   std::optional<DisturbanceObserver> observer_;
-  Eigen::MatrixXd mass_, model_mass_;  // with and without what is observed
+  Eigen::MatrixXd mass_, model_mass_;  // Mass matrix with and without what is observed.
   Eigen::VectorXd bias_, model_bias_;
   Eigen::VectorXd gravity_, gravity_change_;
   Eigen::VectorXd last_v_;

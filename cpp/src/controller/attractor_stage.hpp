@@ -16,8 +16,8 @@ namespace sidestep {
 
 /// What the reference is led by in a step.
 struct Lead {
-  const Goal& goal;                      // of the attractor
-  AvoidanceTrajectory const* avoidance;  // in place of its attraction; null: none
+  const Goal& goal;                      // Goal of the attractor.
+  AvoidanceTrajectory const* avoidance;  // Trajectory that takes the place of its attraction; null: none.
   const Eigen::VectorXd* kept_path;      // the acceleration of a path that is kept, in place of it; null: none
   double pace = 1.0;                     // share of its speed that the arm has, in [0, 1]
   bool rests = false;                    // the arm stops

@@ -11,26 +11,26 @@ namespace sidestep {
 namespace {
 
 constexpr double reach = 0.15;  // [m] of clearance: three sets at 10 Hz see 0.3 m/s before it is 0.09 m; farther takes longer
-constexpr double unchanged = 1e-9;        // [m] change of a clearance that is rounding: the same set again
-constexpr double least_spacing = 0.008;   // [s] between changes that are kept; sets that come faster are summed up
-constexpr double longest_spacing = 0.4;   // [s] beyond it two sets do not make a motion
-constexpr double slowest_closing = 0.02;  // [m/s] slower is for the margin, see SafetySettings::margin
-constexpr double fastest = 5.0;           // [m/s] faster is no motion but another obstacle
-constexpr double least_way =
-    0.003;  // [m] lost in a window: beyond the noise of good depth cameras and the softness of the mean
-constexpr double times_noise = 5.0;    // [-] of the noise, lost in a window: more than independent errors lose
-constexpr double while_closing = 0.5;  // [-] of that, once it closes
-constexpr double brisk = 1.0;   // [m/s] beyond it three changes have to agree: points that jump about agree twice by chance
-constexpr double uneven = 0.5;  // [-] of its share in a steady closing by which a change may differ
-constexpr double first_noise = 0.002;   // [m] until changes tell: of depth cameras
-constexpr int remembered = 20;          // changes that the noise is the mean of
-constexpr int assumed = 4;              // of them that count as the first noise at the start
-constexpr double lateness = 2.0;        // [-] spacings after which the next set is late
-constexpr double jump = 0.005;          // [m] change by one set that brings doubt; less may be noise
-constexpr int doubted_sets = 2;         // after the one that brought it: three in a row
-constexpr int most_doublings = 2;       // of them where something flickered
-constexpr double flicker_memory = 2.0;  // [s]
-constexpr double longest_doubt = 0.3;   // [s] three sets at 10 Hz; of what flickered twice and four times as long
+constexpr double unchanged = 1e-9;        // Change of a clearance that is rounding: the same set again [m].
+constexpr double least_spacing = 0.008;   // Least time between changes that are kept; faster sets are summed up [s].
+constexpr double longest_spacing = 0.4;   // Largest time between two sets that make a motion [s].
+constexpr double slowest_closing = 0.02;  // Least closing speed that is estimated; slower is for SafetySettings::margin [m/s].
+constexpr double fastest = 5.0;           // Largest closing speed: faster is another obstacle [m/s].
+constexpr double least_way = 0.003;       // Least loss of clearance in a window: more than good depth cameras' noise [m].
+constexpr double times_noise = 5.0;       // The same in units of the noise: more than independent errors lose [-].
+constexpr double while_closing = 0.5;     // Share of both that is enough once it closes [-].
+constexpr double brisk =
+    1.0;  // Closing speed beyond which three changes must agree: points that jump agree twice by chance [m/s].
+constexpr double uneven = 0.5;          // Share of a steady closing by which one change may differ [-].
+constexpr double first_noise = 0.002;   // Noise that is assumed until changes tell it: a depth camera's [m].
+constexpr int remembered = 20;          // Number of changes that the noise is the mean of.
+constexpr int assumed = 4;              // Number of changes for which the first noise counts at the start.
+constexpr double lateness = 2.0;        // Spacings after which the next set is late [-].
+constexpr double jump = 0.005;          // Change by one set that brings doubt; less may be noise [m].
+constexpr int doubted_sets = 2;         // Sets after that one which must show the same: three in a row.
+constexpr int most_doublings = 2;       // Doublings of that number where something flickered, at most.
+constexpr double flicker_memory = 2.0;  // Time for which a flicker is remembered [s].
+constexpr double longest_doubt = 0.3;   // Longest doubt: three sets at 10 Hz; twice and four times as long after flickers [s].
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 

@@ -65,17 +65,17 @@ class ClosingEstimate {
   double nearest(double duration) const noexcept;
 
  private:
-  static constexpr int most_changes = 12;  // in a window
+  static constexpr int most_changes = 12;  // Number of changes in a window.
 
   struct Track {
     std::array<double, most_changes> change{}, duration{};  // the newest at 0 [m], [s]
     int count = 0;
     double noise;          // [m]
-    int differences;       // that the noise is the mean of, up to those it remembers
+    int differences;       // Number of differences that the noise is the mean of.
     double pending = 0.0;  // change since the last one that was kept [m]; NaN: not known
   };
   struct Doubt {
-    int sets = 0;        // that have to show the same; 0: none
+    int sets = 0;        // Sets that still have to show the same; 0: no doubt.
     double until = 0.0;  // [s]
     int flickers = 0;    // doubts that ended because something went away
     double last = -1e9;  // [s] the last of them
@@ -90,8 +90,8 @@ class ClosingEstimate {
   const Robot robot_;
   const std::shared_ptr<const ClearanceField> field_;
   const double margin_;
-  const std::vector<std::string> links_;  // of the ellipsoids
-  const Eigen::Matrix3Xd middles_;        // of the ellipsoids, in the frames of their links [m]
+  const std::vector<std::string> links_;  // Links of the ellipsoids.
+  const Eigen::Matrix3Xd middles_;        // Centres of the ellipsoids in the frames of their links [m].
   KinematicState state_;
   Eigen::VectorXd rest_;
   Clearances before_, now_;

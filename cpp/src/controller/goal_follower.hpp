@@ -37,7 +37,7 @@ struct GoalMemory {
   bool target_blocked = false;  // the target is inside a barrier
   bool rests = false;           // the arm rests short of a goal that it was on the way to
   bool begins = false;          // a goal was set and has not begun
-  bool asks_worker = false;     // for a posture
+  bool asks_worker = false;     // A posture is asked of the worker.
   std::uint64_t posture_attempt = 0;
   double next_posture = 0.0;  // time from which another posture is tried [s]
   Goal led;                   // JointGoal: what the reference is led by

@@ -75,9 +75,9 @@ class Controller::Impl {
   void retire() noexcept { worker_.retire(); }
 
   const ControllerModel model;
-  Impl* before = nullptr;              // of those that wait for another thread to destroy them
-  std::atomic<Impl*> lifted{nullptr};  // to go on with once what rests is lifted; its own until then
-  std::uint64_t arm_number = 0;        // of the arms of a controller, in the order in which they were prepared
+  Impl* before = nullptr;              // Next of those that wait for another thread to destroy them.
+  std::atomic<Impl*> lifted{nullptr};  // Controller to go on with once what rests is lifted; owned until then.
+  std::uint64_t arm_number = 0;        // Number among the arms of a controller, in the order of preparation.
 
  private:
   friend class Recorder;
@@ -97,11 +97,11 @@ class Controller::Impl {
     std::uint64_t tick = 0;
     double time = 0.0, next_look = 0.0;                           // [s]
     bool apart = false;                                           // the arm is not exactly where the reference is
-    const Goal* followed = nullptr;                               // by which the reference is led
+    const Goal* followed = nullptr;                               // Goal by which the reference is led.
     StepStatus attraction = StepStatus::invalid_state;            // how the attractor ended
     TorqueStatus program = TorqueStatus::fallback_invalid_input;  // how the program ended
     Eigen::VectorXd wanted, coupling;  // accelerations: after barriers, and to an arm that cannot follow
-    Places places;                     // where barriers leave room
+    Places places;                     // Configurations near which activation distances shrink.
   };
 
   // Parts of `step`, in its order.
@@ -156,7 +156,7 @@ class Controller::Impl {
   ArmDynamics dynamics_;
   SpeedLimiter speed_;
   JointProgram program_;
-  TorqueSolution solution_;  // of the reference
+  TorqueSolution solution_;  // Solution for the reference.
   BackupManoeuvre guard_;
   Tracker tracker_;
   ActivityJudge activity_;

@@ -12,7 +12,7 @@ constexpr double bound_rounding = 1e-9;  // [rad/s] or [m/s] by which a bound co
 /// How far the velocity of a frame may be from the twist that was asked for and count as the same; translation and rotation
 /// each. Joints: see joint_tolerance.
 struct InputTolerance {
-  static constexpr double share = 0.05;  // of what is asked
+  static constexpr double share = 0.05;  // Share of what is asked [-].
   // A turn of 1 rad/s may move the frame's origin as 0.1 m/s may, a translation of 1 m/s may turn it as 1 rad/s may.
   static constexpr double metres_per_turn = 0.1, turns_per_metre = 1.0;  // [m/rad], [rad/m]
   static constexpr double least_linear = 5e-4, least_angular = 1e-3;     // [m/s], [rad/s]: rest

@@ -19,7 +19,7 @@ constexpr double standing = 1e-9;           // Speed that counts as rest [rad/s 
 constexpr double same_sample = 0.005;       // Time in which a sample that is there again is left out [s].
 constexpr double latest_first = 3600.0;     // Latest first sample [s]: later ones are dates, of 1970 or of a boot.
 constexpr double corner = 0.01;             // Largest distance of the curve from the straight lines between samples [rad].
-constexpr double sliding_corner = 0.2;      // Share of it for joints that slide [m/rad].
+constexpr double prismatic_corner = 0.2;    // Share of it for prismatic joints [m/rad].
 constexpr double overshoot = 0.05;          // Share of `corner` that the curve may go beyond a sample where the motion turns.
 constexpr double even_change = 0.2;  // Share of the acceleration limits that a moved stamp needs: the cubic needs the rest.
 constexpr double most_shift = 0.2;   // Largest change of a time stamp [s]: recorders and networks stall for less.
@@ -166,7 +166,7 @@ JointTrajectory::JointTrajectory(const Robot& robot, const Eigen::MatrixXd& q, c
   spread_bunched_stamps(q_, velocity, acceleration, begin, times_);
   corner_ = Eigen::VectorXd::Constant(q.rows(), corner);
   for (int j = 0; j < robot.num_coordinates(); ++j) {
-    corner_[j] *= robot.is_prismatic(j) ? sliding_corner : 1.0;
+    corner_[j] *= robot.is_prismatic(j) ? prismatic_corner : 1.0;
   }
   lead_end_ = Eigen::VectorXd::Zero(q.rows());
   set_slopes(begin);

@@ -18,7 +18,7 @@ struct FoundTrajectory {
   std::uint64_t request_number = 0;
   bool avoid = false;
   AvoidanceTrajectory trajectory;
-  double duration = 0.0;  // from the state to here, by the machine's clock [s]
+  double duration = 0.0;  // Time from the state to the result, by the machine's clock [s].
 };
 
 /// What following the look-ahead remembers from one step to the next, whatever body the arm has.

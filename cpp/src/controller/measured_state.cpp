@@ -11,7 +11,7 @@ namespace sidestep {
 namespace {
 
 constexpr int samples_to_begin_anew = 5;  // samples in a row that disagree with the reference: fewer are faults of measurement
-constexpr double longest_pause = 0.1;     // between two steps, after which one sample is enough: no loop is so late [s]
+constexpr double longest_pause = 0.1;     // Pause between two steps after which one sample is enough: no loop is so late [s].
 constexpr double longest_periods = 5.0;   // the same, of loops of long periods [periods]
 // Error of position between two samples beside what velocities explain: two to ten times an encoder's noise [rad].
 constexpr double measuring_error = 0.01;

@@ -17,25 +17,25 @@ struct MeasurementMemory {
   explicit MeasurementMemory(Eigen::Index nv);
 
   Eigen::VectorXd q, v;            // the state that counts: measured, or predicted where the sample cannot be
-  Eigen::VectorXd last_q, last_v;  // of the last step with a usable state
+  Eigen::VectorXd last_q, last_v;  // State of the last step that had a usable one.
   Eigen::VectorXd turns;           // whole turns that are added to what encoders say [rad]
   bool known_before = false;       // the last step had a usable state
-  bool begins_anew = false;        // at the next usable sample
+  bool begins_anew = false;        // The motion begins anew at the next usable sample.
   bool plausible_before = false;   // a state was measured that an arm can be in
   Plausibility::Impossible impossible;
 
   /// The sample of this step beside the last one.
   struct Sample {
     Eigen::VectorXd q, v, last_q, last_v;  // as measured
-    Eigen::VectorXd turns;                 // of the last sample that was taken
+    Eigen::VectorXd turns;                 // Turns of the last sample that was taken.
     int disagreeing = 0;                   // samples in a row that disagree with the reference
     int repeated = 0;                      // samples in a row that are the same although the arm moves
     int leaps = 0;                         // samples in a row whose velocity leaps and whose position does not
     bool takes_velocity = false;           // a velocity that leaps for good is taken without a filter
     bool unusable = false;                 // the last sample had a wrong size or was not finite
   } sample;
-  Eigen::VectorXd predicted_q, predicted_v;  // where the arm is by the last step
-  bool agrees = true;                        // with the reference; else the arm comes to rest
+  Eigen::VectorXd predicted_q, predicted_v;  // State of the arm by the last step.
+  bool agrees = true;                        // The sample agrees with the reference; else the arm comes to rest.
   bool is_bridged = false;                   // no motion explains the sample: the prediction takes its place
 
   /// An arm away from its command.
@@ -47,9 +47,10 @@ struct MeasurementMemory {
     double moved_until = 0.0;   // time until when it is worth a word that something else moved the arm [s]
   } away;
 
-  double elapsed = 0.0;                                                // since the last step, by the machine's clock [s]
-  double replayed_elapsed = std::numeric_limits<double>::quiet_NaN();  // of a recording, in place of the clock's; NaN: none
-  std::chrono::steady_clock::time_point stepped_at{};                  // end of the last step
+  double elapsed = 0.0;  // since the last step, by the machine's clock [s]
+  double replayed_elapsed =
+      std::numeric_limits<double>::quiet_NaN();        // Elapsed time of a recording, in place of the clock's; NaN: none.
+  std::chrono::steady_clock::time_point stepped_at{};  // end of the last step
 };
 
 /// Stage `observe`: the state of the arm, as far as the measurement can be believed.

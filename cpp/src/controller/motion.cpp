@@ -17,7 +17,8 @@ namespace {
 
 // Rows are kept in memory: 10 million of 7 joints take 2 GB.
 constexpr int most_steps = 10'000'000;
-constexpr double sliding_tolerance = 0.1;  // of that of turning joints [m/rad], as ArrivalSettings have it
+constexpr double prismatic_tolerance =
+    0.1;  // Tolerance of prismatic joints as a share of that of revolute ones, as in ArrivalSettings [m/rad].
 
 void check(const Eigen::VectorXd& value, const char* name, Eigen::Index nv) {
   if (value.size() != nv || !value.allFinite()) {
@@ -67,7 +68,7 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
       const double error = at[j] - goal[j];
       const double way =
           std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error);
-      largest = std::max(largest, slides[static_cast<std::size_t>(j)] ? way / sliding_tolerance : way);
+      largest = std::max(largest, slides[static_cast<std::size_t>(j)] ? way / prismatic_tolerance : way);
     }
     return largest;
   };

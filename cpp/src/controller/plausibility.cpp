@@ -13,23 +13,25 @@
 namespace sidestep {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;  // [rad]
+constexpr double degree = std::numbers::pi / 180.0;  // One degree [rad].
 constexpr double least_in_degrees =
-    3.0 * std::numbers::pi;                 // [rad] one and a half turns: no joint turns farther but for cables
-constexpr double most_in_degrees = 1080.0;  // three turns
-constexpr double many_turns = 100.0;        // [rad] below, whole quarter turns are taken as such
-constexpr double written = 2e-3;            // [rad] to which quarter turns are written
-constexpr double least_reach = 1.0;         // [m] of an arm, for what is far: a wrist alone still stands in a room
-constexpr double far_reaches = 20.0;        // times the reach: no wall of the cell; 0.1 m from the base in mm is 100 m
+    3.0 * std::numbers::pi;                 // Angle from which a joint may be given in degrees: few joints turn farther [rad].
+constexpr double most_in_degrees = 1080.0;  // Largest angle that may be one in degrees: three turns [degrees].
+constexpr double many_turns = 100.0;        // Angle up to which whole quarter turns count as radians [rad].
+constexpr double written = 2e-3;            // Rounding of quarter turns that people write [rad].
+constexpr double least_reach = 1.0;   // Least reach with which "far" is measured: a wrist alone still stands in a room [m].
+constexpr double far_reaches = 20.0;  // Distance in reaches beyond which nothing belongs to the cell; 0.1 m in mm is 100 m [-].
 constexpr double very_far_reaches =
-    100.0;  // times the reach, of most points of a cloud: some may stand for nothing seen, as zeros
-constexpr double fastest_obstacle = 50.0;  // [m/s] nothing thrown is faster; a hand at 0.1 m/s is 100 mm/s
-constexpr double unreachable = 5.0;        // times the reach: a goal so far is no near miss
-constexpr double overdriven = 3.0;         // times the velocity limit: a stick that asks for "as fast as it can" asks for less
-constexpr double slowest = 1.0 / 2000.0;   // of the velocity limits: a glue path takes 1/300
-constexpr double beyond = 1.0;             // [rad | m] outside the position limits: soft limits are moved inwards by less
-constexpr double runaway = 10.0;           // times the velocity limit, measured: noise of encoders is less
-constexpr Eigen::Index most_looks = 1000;  // points of a cloud whose distances are counted
+    100.0;  // The same for most points of a cloud: some may stand for nothing seen, as zeros [-].
+constexpr double fastest_obstacle =
+    50.0;  // Largest speed of an obstacle: nothing thrown is faster; a hand at 0.1 m/s is 100 mm/s [m/s].
+constexpr double unreachable = 5.0;  // Distance of a goal in reaches that is no near miss [-].
+constexpr double overdriven = 3.0;   // Velocity asked for over its limit that a joystick does not exceed [-].
+constexpr double slowest =
+    1.0 / 2000.0;  // Pace of a trajectory as a share of the velocity limits that is too slow to be meant: glue takes 1/300 [-].
+constexpr double beyond = 1.0;             // Distance beyond a position limit that no soft limit explains [rad | m].
+constexpr double runaway = 10.0;           // Measured velocity over its limit that no noise explains [-].
+constexpr Eigen::Index most_looks = 1000;  // Number of points of a cloud whose distances are counted.
 
 std::string number(double value) {
   char text[32];

@@ -14,15 +14,17 @@
 namespace sidestep {
 namespace {
 
-constexpr int iterations = 50;                 // from a configuration nearby about ten are enough
-constexpr int most_fruitless = 8;              // iterations in a row that come no nearer: out of reach from here
-constexpr double progress = 0.99;              // of the error: less is no progress
-constexpr double largest_damping = 0.03;       // [m | rad] directions in which an arm moves less than this are left alone
-constexpr double largest_step = 0.3;           // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
-constexpr double accuracy = 1e-7;              // [m] and [rad]: the frame is at the pose
-constexpr double most_limit_share = 0.05;      // of a joint's range
-constexpr double least_limit_distance = 0.02;  // [rad | m] barriers keep the arm off the last of the way to a limit
-constexpr double clearly = 0.9;                // of the error of a posture nearby: less is worth a way to quite another one
+constexpr int iterations = 50;  // Iterations from one configuration; nearby about ten are enough.
+constexpr int most_fruitless =
+    8;  // Iterations in a row without progress after which the pose counts as out of reach from here.
+constexpr double progress = 0.99;  // Factor by which the error must fall to count as progress [-].
+constexpr double largest_damping =
+    0.03;  // Damping at a large error: directions in which the arm moves less are left alone [m | rad].
+constexpr double largest_step = 0.3;       // Largest step of a joint: a metre of arm moves 4 cm beside the tangent [rad | m].
+constexpr double accuracy = 1e-7;          // Error with which the frame is at the pose [m] and [rad].
+constexpr double most_limit_share = 0.05;  // Largest distance kept from a limit, as a share of the joint's range [-].
+constexpr double least_limit_distance = 0.02;  // Least distance kept from a limit: barriers act there [rad | m].
+constexpr double clearly = 0.9;  // Share of the error of a posture nearby below which quite another one is better [-].
 
 /// Limits with room to them, and a turn for joints that have none.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near,

@@ -11,11 +11,11 @@
 namespace sidestep {
 namespace {
 
-constexpr std::size_t ring_capacity = std::size_t{16} << 20;  // [B] some 20 s of an arm of 7 joints at 1 kHz
-constexpr std::chrono::milliseconds writing_period{2};        // between two looks of the writer at the ring
-constexpr std::chrono::microseconds wait_for_room{50};        // between two looks of a synchronous step
-constexpr std::size_t file_buffer = std::size_t{1} << 18;     // [B]
-constexpr int most_recordings = 1'000'000;                    // of one arm in one folder
+constexpr std::size_t ring_capacity = std::size_t{16} << 20;  // Size of the ring: some 20 s of an arm of 7 joints at 1 kHz [B].
+constexpr std::chrono::milliseconds writing_period{2};        // Time between two looks of the writer at the ring.
+constexpr std::chrono::microseconds wait_for_room{50};        // Time between two looks of a synchronous step for space.
+constexpr std::size_t file_buffer = std::size_t{1} << 18;     // Size of the file's buffer [B].
+constexpr int most_recordings = 1'000'000;                    // Number of recordings of one arm in one folder, at most.
 
 template <class... F>
 struct Overloaded : F... {

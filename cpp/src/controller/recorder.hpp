@@ -90,7 +90,7 @@ class Recorder {
   void finish_quietly() noexcept;
 
   const std::filesystem::path path_;
-  std::mutex& setters_;  // of what follows
+  std::mutex& setters_;  // Guards what follows.
   std::uint64_t noted_request_ = 0, noted_obstacles_ = 0;
   bool keeps_empty_ = true, closed_ = false;
   struct Requested {

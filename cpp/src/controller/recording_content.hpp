@@ -43,9 +43,9 @@ struct RequestRecord {
 
   std::uint64_t number = 0;
   Kind kind = Kind::none;
-  Eigen::VectorXd position, velocity, acceleration;  // of a joint goal; a velocity
+  Eigen::VectorXd position, velocity, acceleration;  // Joint goal; the velocity also of a velocity request.
   std::vector<PoseRecord> poses;
-  std::string frame;  // of a twist
+  std::string frame;  // Frame of a twist.
   Vector6d twist = Vector6d::Zero();
   bool free_rotation = false;
   bool local = false, steer = false;

@@ -14,8 +14,8 @@
 namespace sidestep {
 namespace {
 
-constexpr std::uint64_t largest_chunk = std::uint64_t{1} << 32;  // [B] of some 70 million obstacle points
-constexpr std::uint64_t steps_between_checks = 256;              // whether the replay is interrupted
+constexpr std::uint64_t largest_chunk = std::uint64_t{1} << 32;  // Largest chunk: some 70 million obstacle points [B].
+constexpr std::uint64_t steps_between_checks = 256;  // Steps between two looks at whether the replay is interrupted.
 
 /// The chunks of a recording, one after the other.
 class ChunkReader {

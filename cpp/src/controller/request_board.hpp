@@ -106,7 +106,7 @@ class RequestBoard {
   TripleBuffer<NumberedRequest> requests_;
   TripleBuffer<NumberedObstacles> obstacles_;
   TripleBuffer<Eigen::VectorXd> measured_;
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // Guards what follows.
   Request request_;
   std::uint64_t request_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;

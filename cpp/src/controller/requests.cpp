@@ -11,7 +11,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double pose_position_share = 2.0, pose_rotation_share = 0.5;  // of the stiffness, per m² and per rad²
+constexpr double pose_position_share = 2.0,
+                 pose_rotation_share = 0.5;  // Stiffness of pose goals as a share of the barriers' stiffness [1/m², 1/rad²].
 
 /// Throws what is wrong with the sizes and numbers of a goal, or the robot that it was made for.
 [[noreturn]] void refuse_goal(const JointGoal& goal, const Robot& robot) {

@@ -7,7 +7,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double none = std::numeric_limits<double>::infinity();  // no bound
+constexpr double none = std::numeric_limits<double>::infinity();  // Stands for no bound.
 constexpr double most_seed = 1.8446744073709552e19;
 
 }  // namespace

@@ -35,7 +35,7 @@ class SpeedLimiter {
   const ControllerSettings& settings_;
   FrameSpeeds frames_;
   SpeedLimitNow at_reference_, at_arm_;
-  int nearest_point_ = -1;  // of obstacles
+  int nearest_point_ = -1;  // Nearest obstacle point.
 };
 
 }  // namespace sidestep

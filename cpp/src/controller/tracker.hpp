@@ -71,11 +71,11 @@ class Tracker {
   const JointKinds& joints_;
   const ControllerSettings& settings_;
   const bool torque_, drives_track_;
-  const double frequency_;  // of the feedback, at most [1/s]
+  const double frequency_;  // Largest frequency of the feedback [1/s].
   JointProgram program_;
   TorqueSolution solution_;
   Eigen::VectorXd feedback_;
-  Eigen::VectorXd drift_;  // of an output of velocity, beside the reference [rad/s | m/s]
+  Eigen::VectorXd drift_;  // Commanded velocity less that of the reference, with velocity output [rad/s | m/s].
   Eigen::MatrixXd mass_cholesky_;
   Eigen::SelfAdjointEigenSolver<Small> modes_;
 };

@@ -17,7 +17,7 @@ struct TrajectoryClock {
   double free = 0.0, seen = -1.0;               // the path is free up to there; it is looked at there
   double allowed = 1.0;                         // the rate that limits, errors and obstacles leave
   double delay = 0.0;                           // behind time, at the end the last [s]
-  double clearance = 0.0;                       // that is asked for [m]
+  double clearance = 0.0;                       // Clearance that is asked for [m].
   bool blocked = false;
   ClearanceQuery::Nearest blocker{};
 };
@@ -27,8 +27,8 @@ struct TrajectoryMemory {
   explicit TrajectoryMemory(Eigen::Index nv);
 
   TrajectoryClock clock;
-  Eigen::VectorXd begin_q, begin_v;        // of the reference
-  Eigen::VectorXd path_q, path_v, path_a;  // at the clock, at full speed
+  Eigen::VectorXd begin_q, begin_v;        // State of the reference where it began.
+  Eigen::VectorXd path_q, path_v, path_a;  // Path at the clock, at full speed.
   Eigen::Index farthest = 0;               // joint that is farthest from it
 };
 

@@ -65,7 +65,7 @@ class TwistSolver {
   KinematicState state_, ahead_;
   FrameJacobian jacobian_transposed_, projected_, jacobian_ahead_;
   Matrix6d principal_ = Matrix6d::Identity();  // directions of the Jacobian
-  Vector6d squares_ = Vector6d::Zero();        // of its singular values
+  Vector6d squares_ = Vector6d::Zero();        // Squares of its singular values.
   Vector6d twist_ = Vector6d::Zero();
   Eigen::VectorXd best_v_, ahead_q_;
 };

@@ -21,11 +21,11 @@ struct Snapshot {
   Snapshot(const Robot& robot, const AvoidanceTrajectory& flight);
 
   double time = 0.0;
-  Eigen::VectorXd q, v;  // of the reference
+  Eigen::VectorXd q, v;  // State of the reference.
   std::uint64_t request_number = 0, posture_attempt = 0;
   std::uint64_t obstacle_number = 0;
   double obstacle_age = 0.0;
-  JointGoal followed;        // by which the reference is led
+  JointGoal followed;        // Goal by which the reference is led.
   bool by_pose = false;      // the pose goal itself is followed, as it moves
   double request_age = 0.0;  // time for which it has moved [s]
   /// The clock of the trajectory that is followed, which began at q, v.
@@ -35,7 +35,7 @@ struct Snapshot {
     double clock = 0.0, rate = 0.0;
   } trajectory;
   OnlinePlanner::Following following;
-  Places places;  // where barriers leave room
+  Places places;  // Configurations near which activation distances shrink.
   bool avoiding = false;
   AvoidanceTrajectory flight;
   std::chrono::steady_clock::time_point written{};

@@ -192,7 +192,7 @@ class Controller {
   void take_over() noexcept;
   struct Held {
     Attachment object;
-    Eigen::VectorXd q;  // where it was attached; empty: before the first step
+    Eigen::VectorXd q;  // Configuration at which it was attached; empty: before the first step.
     std::optional<RestingObject> resting;
   };
   Impl& newest() const noexcept;
@@ -207,22 +207,22 @@ class Controller {
 
   const ControllerSettings settings_;
   Command command_;
-  const Command refused_;  // of a thread that steps while another one does
+  const Command refused_;  // Command for a thread that steps while another one does.
   SingleStepper stepper_;
-  std::unique_ptr<Impl> impl_;           // of the thread of `step`
+  std::unique_ptr<Impl> impl_;           // Used by the thread of `step`.
   std::atomic<Impl*> next_{nullptr};     // which it takes over in the next step
   std::atomic<Impl*> retired_{nullptr};  // those before, for another thread to destroy
-  std::atomic<bool> restarts_{false};    // in the next step
+  std::atomic<bool> restarts_{false};    // The next step restarts.
   mutable std::mutex setters_;
-  Impl* newest_;                // of those that step, which setters tell
+  Impl* newest_;                // Newest of those that step, which setters tell.
   Impl* lifted_ = nullptr;      // the one that newest_ goes over to, which they tell too
-  mutable std::mutex changes_;  // of what follows; held while a body is prepared
+  mutable std::mutex changes_;  // Guards what follows; held while a body is prepared.
   Arm whole_;                   // without what is attached
   std::vector<Held> held_;
   bool has_torque_;
-  std::uint64_t arm_count_ = 0;  // of arms after the first
+  std::uint64_t arm_count_ = 0;  // Number of arms after the first.
   std::unique_ptr<Recorder> recorder_;
-  std::atomic<Recorder*> records_{nullptr};  // of the thread of `step`: null once the recording has ended
+  std::atomic<Recorder*> records_{nullptr};  // Used by the thread of `step`; null once the recording has ended.
   std::atomic<bool> in_use_{false};
 };
 

@@ -72,10 +72,10 @@ class JointTrajectory {
   void cubic(Eigen::Index k, double u, Eigen::VectorXd& q, Eigen::VectorXd& v, Eigen::VectorXd& a) const noexcept;
   Eigen::Index span_at(double s) const noexcept;
 
-  bool led_ = false;  // to its first sample: the first column is where it begins
+  bool led_ = false;  // The first column is where it begins, before the first sample.
   bool stands_ = false;
   std::vector<bool> turns_;
-  Eigen::VectorXd times_, stamps_;  // of the samples: on the clock, and as they were given
+  Eigen::VectorXd times_, stamps_;  // Times of the samples on the clock, and as they were given.
   Eigen::MatrixXd q_, v_;           // (nv × K)
   Eigen::VectorXd corner_;          // [rad | m] off the straight lines at most
   Eigen::VectorXd lead_end_;        // velocity where the way to the first sample ends

@@ -34,7 +34,7 @@ class SingleStepper {
 
  private:
   static constexpr int settled = 1000;    // steps of one thread after which earlier changes do not count
-  static constexpr int most_changes = 2;  // of threads: to another one, and back
+  static constexpr int most_changes = 2;  // Changes of the thread: to another one, and back.
 
   std::atomic<bool> inside_{false};
   std::thread::id last_;
