@@ -42,6 +42,7 @@ def count(checkout: Checkout) -> dict[str, Any]:
         "circles of Python packages": _python_circles(checkout, by_room=True),
         "enums of the Python package": _bound_enums(checkout),
         "enums in public headers": _public_enums(checkout),
+        "enums of results in public modules": _result_enums(checkout),
         **{f"files that know the {kind}": checkout.that_know(pattern) for kind, pattern in EXAMPLES.items()},
         "code lines of the core": sum(map(cpp_tokens.code_lines, checkout.core)),
         "code lines of the bindings": sum(map(cpp_tokens.code_lines, checkout.bindings)),
@@ -133,6 +134,17 @@ def _bound_enums(checkout: Checkout) -> list[str]:
 def _public_enums(checkout: Checkout) -> list[str]:
     headers = [path for path in checkout.core if checkout.name(path).startswith("cpp/include/")]
     return sorted(name for path in headers for name in checkout.read[path].enums)
+
+
+def _result_enums(checkout: Checkout) -> list[str]:
+    """Bound enums that say how something ended or stands, and that a public module hands on."""
+    faces = "".join(
+        path.read_text(encoding="utf-8")
+        for path in checkout.python
+        if path.name in ("__init__.py", "__init__.pyi")
+    )
+    results = [name for name in _bound_enums(checkout) if re.search(r"(Status|Fault|State|Activity)$", name)]
+    return [name for name in results if re.search(rf"\b{name}\b", faces)]
 
 
 def amount(value: Any) -> int:
