@@ -13,11 +13,12 @@ ROOMS = ("math robot scene body clearance arm attractor constraints guard planni
 def included(file: Path, text: str) -> list[Path]:
     """The files of the core that `text`, of `file`, includes."""
     found = []
-    for name in re.findall(r'^#include "([^"]+)"', text, re.MULTILINE):
+    for mark, name in re.findall(r'^\s*#\s*include\s*(["<])([^">]+)[">]', text, re.MULTILINE):
         places = [(file.parent / name).resolve(), ROOTS["include"] / name]
         target = next((place for place in places if place.is_file()), None)
-        assert target is not None, f"{file}: there is no {name}"
-        found.append(target)
+        assert target is not None or mark == "<", f"{file}: there is no {name}"
+        if target is not None:  # others are of the compiler, the system or Eigen
+            found.append(target)
     return found
 
 

@@ -23,7 +23,7 @@ MOST_FILE_LINES = 400
 # Of each thing that is added again and again, an example by its names: before it was renamed, and since.
 EXAMPLES = {
     "constraint": r"[Ss]peed_?[Rr]ows|[Ss]peed_?(near_?obstacles_?|Near_?Obstacles_?)?[Cc]onstraint",
-    "shape": r"[Cc]apsule",
+    "shape": r"(?<!nb::)[Cc]apsule",
     "setting": r"\bdrift_gain\b",
 }
 

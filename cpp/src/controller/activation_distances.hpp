@@ -11,7 +11,7 @@
 
 namespace sidestep {
 
-/// Configurations where barriers leave room: narrow places of the path, and the target (nv × num).
+/// Configurations near which activation distances shrink: narrow places of the path, and the target (nv × num).
 struct Places {
   explicit Places(Eigen::Index nv);
 
@@ -19,7 +19,7 @@ struct Places {
   Eigen::Index num = 0;
 };
 
-/// Activation distances of the barriers that leave room at places, as a worker found them for a target.
+/// Activation distances of the barriers that shrink at places, as a worker found them for a target.
 struct FoundActivations {
   std::uint64_t request_number = 0, posture_attempt = 0;
   Eigen::VectorXd values;
@@ -31,7 +31,7 @@ class ActivationDistances {
  public:
   ActivationDistances(std::shared_ptr<const GeometricSystem> system, const std::vector<Eigen::Index>& clearances);
 
-  /// Writes activation distances that leave room at places; whether the last of them is inside a barrier. For any thread with a
+  /// Writes activation distances that shrink at places; whether the last of them is inside a barrier. For any thread with a
   /// workspace of its own.
   bool lower_at(const Places& places, const Obstacles& obstacles, GeometricSystem::Workspace& workspace,
                 Eigen::VectorXd& activations) const noexcept;

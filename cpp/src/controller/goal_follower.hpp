@@ -93,7 +93,7 @@ class GoalFollower : private GoalMemory {
   Way way(double rest_time, const Goal* followed) const noexcept;
   /// The target is inside something, and the arm goes straight to it: it stops before.
   bool stops_short(const Goal* followed) const noexcept;
-  /// Writes where barriers leave room.
+  /// Writes near which configurations activation distances shrink.
   void write_places(Places& places) const noexcept;
   /// Where `followed` is on the planner's path; number 0 where it is not led by one.
   OnlinePlanner::Following following(const Goal* followed) const noexcept;

@@ -109,7 +109,7 @@ class Controller::Impl {
   /// The motion begins where the arm is, or the reference goes on by a period. Whether the arm is elsewhere than the reference.
   bool follow_arm() noexcept;
   void begin_motion() noexcept;
-  /// Activation distances that leave room where the arm is led; `looks`: among what moves.
+  /// Activation distances, shorter where the arm is led; `looks`: it is time to look for what moves.
   void update_activation_distances(bool looks, const Obstacles& obstacles) noexcept;
   /// Out of the way of what moves, in place of what is followed; and the pace that the look-ahead leaves.
   void look_ahead(const Goal& followed, double time, const Obstacles& obstacles) noexcept;

@@ -6,7 +6,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double near_moving = 0.1;       // distance of the arm to what moves below which barriers keep all their room [m]
+constexpr double near_moving = 0.1;  // distance of the arm to what moves below which activation distances do not shrink [m]
 constexpr double moving_foresight = 1.0;  // time in which what moves could be as near [s]
 
 }  // namespace

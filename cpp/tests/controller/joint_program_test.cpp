@@ -63,7 +63,7 @@ BOOST_AUTO_TEST_CASE(a_torque_is_that_of_the_acceleration_by_the_dynamics) {
   p.dynamics.update(test::state_at(p.model.arm.robot(), p.q), {});
   const Eigen::VectorXd wanted = Eigen::Vector2d(5.0, -3.0);
   BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.solution) == TorqueStatus::ok));
-  // The price of torque costs tracking of about 1e-8 rad/s², see TorqueControllerSettings.
+  // The price of torque costs tracking of about 1e-8 rad/s², see MotionProgramSettings.
   BOOST_TEST((p.solution.acceleration - wanted).norm() < 1e-7);
   const Eigen::VectorXd torque = p.dynamics.mass() * p.solution.acceleration + p.dynamics.bias();
   BOOST_TEST((p.solution.torque - torque).norm() < programmed);
