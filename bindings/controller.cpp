@@ -453,6 +453,8 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
       .def_prop_ro("values", of_last_step([](const Controller& self) { return to_numpy(self.workspace().values); }),
                    "(m,) psi of every coordinate at the last step, see labels.")
+      .def_prop_ro("program_status", of_last_step([](const Controller& self) { return self.program_status(); }),
+                   "How the quadratic program ended in the last step, for tests and studies; `command.status` is what counts.")
       .def_prop_ro(
           "geometric_step",
           of_last_step([](const Controller& self) {

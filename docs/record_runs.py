@@ -21,10 +21,10 @@ from sidestep.studio.guard import Guard
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, link_meshes, reach
 from sidestep.studio.page.camera import Viewpoint, clear_view, extent
+from sidestep.studio.page.cameras import NEAR
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacles import ObstacleViews
 from sidestep.studio.page.scene import point_cameras, set_up_scene
-from sidestep.studio.page.view import NEAR
 from sidestep.studio.page.why import Why
 from sidestep.studio.server import HOST, guarded_server
 from sidestep.studio.session import Session

@@ -3404,6 +3404,12 @@ class Controller:
         """(m,) psi of every coordinate at the last step, see labels."""
 
     @property
+    def program_status(self) -> TorqueStatus:
+        """
+        How the quadratic program ended in the last step, for tests and studies; `command.status` is what counts.
+        """
+
+    @property
     def geometric_step(self) -> Step:
         """
         The Step of the geometric system in the last step, with its clearances, metric and diagnosis.

@@ -76,5 +76,5 @@ def test_the_controller_keeps_the_clearances_with_a_bad_goal(robot: ss.Robot) ->
     for _ in range(350):
         command = begins_anew()
         assert command.bound_by >= 0
-    assert command.system == StepStatus.goal_outside_limits
+    assert controller.geometric_step.status == StepStatus.goal_outside_limits
     assert command.activity == ss.Activity.blocked

@@ -172,7 +172,7 @@ def test_a_pose_in_millimetres_and_times_in_milliseconds_are_questioned(fr3: ss.
     pose[:3, 3] = 450.0, 200.0, 400.0
     with pytest.warns(RuntimeWarning, match=rf"the pose of frame '{TIP}' is 6\d\d m from .* in millimetres"):
         made.set_goal(ss.PoseGoal(fr3.robot, TIP, pose))
-    with pytest.warns(RuntimeWarning, match="it takes 4e.03 s, .* times in milliseconds"):
+    with pytest.warns(RuntimeWarning, match="it takes 4e.03 s and .* times in milliseconds"):
         made.set_trajectory([fr3.neutral, fr3.neutral + 0.3], [0.0, 4000.0])
     pose[:3, 3] = 2.0, 0.0, 0.5  # out of reach, by metres
     with warnings.catch_warnings():

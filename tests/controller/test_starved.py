@@ -108,7 +108,7 @@ def test_what_slows_it_is_explained():
         if command.pace < 1.0 and command.activity == ss.Activity.moving:
             words = controller.explain()
             break
-    assert f"the look-ahead is {command.look_ahead_age:.1f} s old, it gets too little processor time" in words
+    assert f"the look-ahead is {command.look_ahead_age:.1f} s old; it gets too little processor time" in words
     assert f"slowed to {100 * command.pace:.0f} %" in words
 
 

@@ -239,7 +239,7 @@ def torques_of_studio() -> Array:
     one, found = session(), []
     for _ in range(STEPS):
         one.step()
-        found.append(one._torque)
+        found.append(one._steps.torque)
     return np.array(found)
 
 
@@ -291,7 +291,7 @@ def test_a_pose_goal_is_the_same_in_a_file_in_the_studio_and_in_python() -> None
     found = []
     for _ in range(STEPS):
         posed.step()
-        found.append(posed._torque)
+        found.append(posed._steps.torque)
     np.testing.assert_array_equal(found, run.torque)
 
     one, robot = controller("acceleration"), ss.Robot.named("fr3")

@@ -62,6 +62,7 @@ class Controller::Impl {
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
   StepStatus attraction_status() const noexcept { return state_.attraction; }
+  TorqueStatus program_status() const noexcept { return state_.program; }
   const TorqueSolution& solution() const noexcept { return solution_; }
 
   // Before the first step.

@@ -169,6 +169,8 @@ class Controller {
   const GeometricSystem::Workspace& workspace() const noexcept;
   /// How the geometric system ended in the last step.
   StepStatus attraction_status() const noexcept;
+  /// How the quadratic program ended in the last step.
+  TorqueStatus program_status() const noexcept;
   /// The quadratic program's solution of the last step.
   const TorqueSolution& solution() const noexcept;
   /// The target configuration: the goal, or the posture of a pose goal; empty if none is known. Only for the thread of
