@@ -19,6 +19,13 @@ struct ToldDynamics {
 /// What the arm was commanded last.
 struct LastOutput {
   explicit LastOutput(Eigen::Index nv) : acceleration(Eigen::VectorXd::Zero(nv)), torque(acceleration) {}
+  /// No allocation.
+  void take(const Eigen::VectorXd& a, const Eigen::VectorXd& t, bool by_torque) noexcept {
+    acceleration = a;
+    torque = t;
+    has_torque = by_torque;
+  }
+
   Eigen::VectorXd acceleration, torque;  // (nv) each
   bool has_torque = false;
 };

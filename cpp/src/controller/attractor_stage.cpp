@@ -10,12 +10,15 @@ AttractorStage::AttractorStage(std::shared_ptr<const GeometricSystem> system, co
       reference_(*system_),
       arm_(*system_),
       corrected_(system_->robot().num_coordinates(), system_->num_embedding_coordinates()),
-      arm_corrected_(corrected_) {}
+      arm_corrected_(corrected_),
+      clearances_(&reference_.clearances),
+      arm_clearances_(&arm_.clearances) {}
 
 StepStatus AttractorStage::attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles,
                                    const ClosingEstimate& closing, Eigen::VectorXd& wanted) noexcept {
   reference_.horizon = arm_.horizon = lead.avoidance != nullptr ? 0.0 : Horizon::of_obstacles;
   const StepStatus status = system_->acceleration(reference.q, reference.v, lead.goal, obstacles, reference_);
+  clearances_ = &closing.corrected(reference_.clearances, corrected_);
   wanted = reference_.acceleration;
   if (!is_fallback(status)) {
     if (lead.avoidance != nullptr) {
@@ -53,9 +56,12 @@ void AttractorStage::wait_in_doubt(const ClosingEstimate& closing, Eigen::Vector
   }
 }
 
-bool AttractorStage::look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept {
+bool AttractorStage::look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
+                                 const ClosingEstimate& closing) noexcept {
   arm_.activations = reference_.activations;
-  return system_->embed(q, v, obstacles, arm_);
+  const bool usable = system_->embed(q, v, obstacles, arm_);
+  arm_clearances_ = &closing.corrected(arm_.clearances, arm_corrected_);
+  return usable;
 }
 
 void AttractorStage::look_at_reference(const Reference& reference, const Goal& goal, const Obstacles& obstacles) noexcept {

@@ -33,17 +33,14 @@ class AttractorStage {
   StepStatus attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles, const ClosingEstimate& closing,
                      Eigen::VectorXd& wanted) noexcept;
   /// The clearances of the arm, where it is not exactly where the reference is; false where they are unusable.
-  bool look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept;
+  bool look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
+                   const ClosingEstimate& closing) noexcept;
   /// The clearances at the reference alone, as a step has left them.
   void look_at_reference(const Reference& reference, const Goal& goal, const Obstacles& obstacles) noexcept;
 
-  /// Clearances at the reference or the arm, with the closings that nobody told.
-  const Clearances& corrected(const ClosingEstimate& closing) noexcept {
-    return closing.corrected(reference_.clearances, corrected_);
-  }
-  const Clearances& corrected_of_arm(const ClosingEstimate& closing) noexcept {
-    return closing.corrected(arm_.clearances, arm_corrected_);
-  }
+  /// Clearances of the last `attract` and of the last `look_at_arm`, with the closings that nobody told.
+  const Clearances& clearances() const noexcept { return *clearances_; }
+  const Clearances& arm_clearances() const noexcept { return *arm_clearances_; }
 
   const GeometricSystem& system() const noexcept { return *system_; }
   const GeometricSystem::Workspace& at_reference() const noexcept { return reference_; }
@@ -57,7 +54,8 @@ class AttractorStage {
   const std::shared_ptr<const GeometricSystem> system_;
   const ControllerSettings& settings_;
   GeometricSystem::Workspace reference_, arm_;
-  Clearances corrected_, arm_corrected_;
+  Clearances corrected_, arm_corrected_;  // Memory for clearances that closings change.
+  const Clearances *clearances_, *arm_clearances_;
 };
 
 }  // namespace sidestep

@@ -9,7 +9,7 @@ namespace sidestep {
 
 void Controller::Impl::take_requests_of(Impl& before) {
   if (const Eigen::VectorXd q = before.board_.last_measured(); q.size() != 0) {
-    board_.measured().put(q);
+    board_.show_measured(q);
   }
   board_.take_over(before.board_, [this](const Obstacles& shared) { share_with_planner(shared); });
 }
@@ -157,7 +157,7 @@ std::string Controller::attach(const Attachment& object) {
   {
     const std::lock_guard orders(setters_);
     last.q = newest().board().last_measured();
-    around = *newest().board().newest_obstacles();
+    around = *newest().board().newest_obstacles().obstacles;
   }
   if (!object.rests_on.empty()) {
     if (last.q.size() == 0) {

@@ -1,12 +1,9 @@
 // The public face, and what is set from any thread.
 #include "sidestep/controller/controller.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "impl.hpp"
 #include "recorder.hpp"

@@ -133,9 +133,7 @@ std::string Controller::Impl::explain_way() const {
     text += "leaving a local minimum by a sub-goal; ";
   }
   if (inputs_.request().has_input()) {
-    return text + explain_input(model, inputs_, command_, reference_.next_v,
-                                model.system->diagnose(attractor_.at_reference()).coordinate,
-                                attractor_.at_reference().clearances, obstacles());
+    return text + explain_input(model, inputs_, attractor_, command_, reference_.next_v, obstacles());
   }
   const Diagnosis why = diagnosis(attractor_, inputs_, measured_, arm_state(state_.apart), model.joints);
   const bool is_under_way = why.state == MotionState::free || why.state == MotionState::arriving;

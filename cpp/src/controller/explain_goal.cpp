@@ -46,9 +46,9 @@ std::string way_out(const Robot& robot, const Obstruction& here) {
 }  // namespace
 
 std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const ClearanceQuery& body) {
-  const Request request = board.newest_request();
-  const std::optional<Posture> posture = board.posture();
-  const Goal* const goal = std::get_if<Goal>(&request);
+  const RequestBoard::Newest newest = board.newest();
+  const std::optional<Posture>& posture = newest.posture;
+  const Goal* const goal = std::get_if<Goal>(&newest.request);
   if (goal == nullptr) {
     return std::nullopt;
   }
@@ -57,8 +57,8 @@ std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const 
     return std::nullopt;
   }
   Obstruction found;
-  const bool touches = RrtConnect(body, of_endpoints())
-                           .obstructed(joints != nullptr ? joints->position : posture->q, *board.newest_obstacles(), found);
+  const bool touches =
+      RrtConnect(body, of_endpoints()).obstructed(joints != nullptr ? joints->position : posture->q, *newest.obstacles, found);
   return touches ? std::optional(found) : std::nullopt;
 }
 
@@ -70,12 +70,12 @@ std::string explain_target(const ControllerModel& model, const RequestBoard& boa
   }
   const Eigen::VectorXd& target = goal.target_position();
   const bool is_pose = inputs.request().pose_goal() != nullptr;
-  const std::optional<Posture> posture = board.posture();
-  Obstacles obstacles = *board.newest_obstacles();
+  const RequestBoard::Newest newest = board.newest();
+  Obstacles obstacles = *newest.obstacles;
   obstacles.advance(obstacle_age);
   Obstruction obstruction;
   RrtConnect endpoint_checker(model.body, of_endpoints());
-  if (posture && posture->touches_itself &&
+  if (newest.posture && newest.posture->touches_itself &&
       endpoint_checker.obstructed(target, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
     return "no posture without self-collision was found for the pose: at the last one " + describe(obstruction) +
            "; searching others";
@@ -104,7 +104,7 @@ std::string explain_start(const Robot& robot, const Obstruction& here) {
 }
 
 std::string explain_reach(const RequestBoard& board) {
-  const std::optional<Posture> posture = board.posture();
+  const std::optional<Posture> posture = board.newest().posture;
   if (!posture) {
     return {};
   }

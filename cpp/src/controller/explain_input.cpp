@@ -137,9 +137,8 @@ std::string explain_lag(const ControllerModel& model, const InputsStage& inputs,
 
 }  // namespace
 
-std::string explain_input(const ControllerModel& model, const InputsStage& inputs, const Command& command,
-                          const Eigen::VectorXd& next_v, Eigen::Index bent_by, const Clearances& clearances,
-                          const Obstacles& obstacles) {
+std::string explain_input(const ControllerModel& model, const InputsStage& inputs, const AttractorStage& attractor,
+                          const Command& command, const Eigen::VectorXd& next_v, const Obstacles& obstacles) {
   const VelocityFollower& velocity = inputs.velocity();
   const VelocityBounds::First& held = velocity.first_held();
   const bool on_trajectory = inputs.request().trajectory() != nullptr;
@@ -153,11 +152,11 @@ std::string explain_input(const ControllerModel& model, const InputsStage& input
     by = "joint '" + model.arm.robot().coordinate_names()[static_cast<std::size_t>(held.joint)] + "' and its " +
          (held.upper ? "upper" : "lower") + " limit";
   } else if (clearance < 0 && !on_trajectory && (velocity.bends() || velocity.misses_for_long())) {
-    clearance = bent_by;
+    clearance = attractor.system().diagnose(attractor.at_reference()).coordinate;
   }
   if (clearance >= 0) {
     by = parties(model.system->labels()[static_cast<std::size_t>(clearance)],
-                 obstacles.words_for(clearances.nearest[clearance]));
+                 obstacles.words_for(attractor.at_reference().clearances.nearest[clearance]));
   }
   if (on_trajectory) {
     std::string words = "follows a trajectory";

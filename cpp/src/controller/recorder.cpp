@@ -136,7 +136,7 @@ void Recorder::note(const Controller::Impl& newest) {
     return;
   }
   const RequestBoard& board = newest.board();
-  const auto [obstacle_number, obstacles] = board.numbered_obstacles();
+  const auto [obstacle_number, obstacles] = board.newest_obstacles();
   const std::uint64_t request_number = board.request_number();
   if (obstacle_number > noted_obstacles_) {
     noted_obstacles_ = obstacle_number;
@@ -187,7 +187,7 @@ void Recorder::note(const Controller::Impl& newest) {
                             record.times = trajectory.samples->times;
                             record.steer = trajectory.behaviour == TrajectoryBehaviour::steer;
                           }},
-               board.newest_request());
+               board.request(request_number));
     add(recording::request_tag, record);
   }
 }

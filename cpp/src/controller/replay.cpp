@@ -258,7 +258,7 @@ void Replay::give_request(std::uint64_t number) {
   }
   request_ = number;
   controller_.tell([&](Impl& impl) {
-    impl.board().number_next(number, 0);
+    impl.board().number_next_request(number);
     impl.put(request_of(found->second, impl));
   });
   requests_.erase(requests_.begin(), found);  // the newest stays, for one that was taken twice
@@ -282,7 +282,7 @@ void Replay::give_obstacles(std::uint64_t number) {
     }
   }
   controller_.tell([&](Impl& impl) {
-    impl.board().number_next(0, number);
+    impl.board().number_next_obstacles(number);
     impl.set_obstacles(made);
   });
   obstacles_.erase(obstacles_.begin(), found);

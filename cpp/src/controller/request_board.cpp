@@ -27,25 +27,29 @@ void RequestBoard::show_obstacles(std::shared_ptr<const Obstacles> copy, std::st
   obstacles_.put({++obstacle_count_, std::move(obstacles)});
 }
 
-RequestBoard::All RequestBoard::all() const {
+RequestBoard::Newest RequestBoard::newest() const {
   const std::lock_guard lock(mutex_);
-  return {request_, shown_obstacles_, questions_, request_count_, obstacle_count_};
+  return {request_, shown_obstacles_, posture_, questions_, request_count_, obstacle_count_};
 }
 
-void RequestBoard::show(const All& all) {
-  request_ = all.request;
-  shown_obstacles_ = all.obstacles;
-  questions_ = all.questions;
-  request_count_ = all.request_count;
-  obstacle_count_ = all.obstacle_count;
-  requests_.put({request_count_, all.request});
-  obstacles_.put({obstacle_count_, *all.obstacles});
+void RequestBoard::show(const Newest& newest) {
+  request_ = newest.request;
+  shown_obstacles_ = newest.obstacles;
+  questions_ = newest.questions;
+  request_count_ = newest.request_number;
+  obstacle_count_ = newest.obstacle_number;
+  requests_.put({request_count_, newest.request});
+  obstacles_.put({obstacle_count_, *newest.obstacles});
 }
 
-void RequestBoard::number_next(std::uint64_t request, std::uint64_t obstacles) noexcept {
+void RequestBoard::number_next_request(std::uint64_t number) noexcept {
   const std::lock_guard lock(mutex_);
-  request_count_ = request == 0 ? request_count_ : request - 1;
-  obstacle_count_ = obstacles == 0 ? obstacle_count_ : obstacles - 1;
+  request_count_ = number - 1;
+}
+
+void RequestBoard::number_next_obstacles(std::uint64_t number) noexcept {
+  const std::lock_guard lock(mutex_);
+  obstacle_count_ = number - 1;
 }
 
 void RequestBoard::show_posture(std::uint64_t request_number, const Posture& posture) {
@@ -68,7 +72,7 @@ std::uint64_t RequestBoard::request_number() const {
   return request_count_;
 }
 
-RequestBoard::NewestObstacles RequestBoard::numbered_obstacles() const {
+RequestBoard::NewestObstacles RequestBoard::newest_obstacles() const {
   const std::lock_guard lock(mutex_);
   return {obstacle_count_, shown_obstacles_};
 }
@@ -76,21 +80,6 @@ RequestBoard::NewestObstacles RequestBoard::numbered_obstacles() const {
 Request RequestBoard::request(std::uint64_t number) const {
   const std::lock_guard lock(mutex_);
   return request_count_ == number ? request_ : Request();
-}
-
-Request RequestBoard::newest_request() const {
-  const std::lock_guard lock(mutex_);
-  return request_;
-}
-
-std::shared_ptr<const Obstacles> RequestBoard::newest_obstacles() const {
-  const std::lock_guard lock(mutex_);
-  return shown_obstacles_;
-}
-
-std::optional<Posture> RequestBoard::posture() const {
-  const std::lock_guard lock(mutex_);
-  return posture_;
 }
 
 Questions RequestBoard::questions() const {

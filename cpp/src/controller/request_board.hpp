@@ -43,13 +43,14 @@ class RequestBoard {
   /// Takes over what stands on another board, and hands it over to the step. `share` as above.
   template <class Share>
   void take_over(const RequestBoard& before, Share&& share) {
-    const All all = before.all();
+    const Newest newest = before.newest();
     const std::lock_guard lock(mutex_);
-    share(*all.obstacles);
-    show(all);
+    share(*newest.obstacles);
+    show(newest);
   }
-  /// The next request and the next obstacles put have these numbers, of a recording; 0: as they come.
-  void number_next(std::uint64_t request, std::uint64_t obstacles) noexcept;
+  /// The next request put, or the next obstacles, have this number: that of a recording.
+  void number_next_request(std::uint64_t number) noexcept;
+  void number_next_obstacles(std::uint64_t number) noexcept;
 
   /// The posture that was found for the request of that number.
   void show_posture(std::uint64_t request_number, const Posture& posture);
@@ -65,48 +66,50 @@ class RequestBoard {
     }
   }
 
+  /// All that was set last and found for it, as it belongs together.
+  struct Newest {
+    Request request;
+    std::shared_ptr<const Obstacles> obstacles;
+    std::optional<Posture> posture;
+    Questions questions;
+    std::uint64_t request_number = 0, obstacle_number = 0;
+  };
+  Newest newest() const;
   std::uint64_t request_number() const;
+  /// The request of that number; none where there is a newer one.
+  Request request(std::uint64_t number) const;
   struct NewestObstacles {
     std::uint64_t number = 0;
     std::shared_ptr<const Obstacles> obstacles;
   };
-  NewestObstacles numbered_obstacles() const;
-  /// The request of that number; none where there is a newer one.
-  Request request(std::uint64_t number) const;
-  Request newest_request() const;
-  std::shared_ptr<const Obstacles> newest_obstacles() const;
-  std::optional<Posture> posture() const;
+  NewestObstacles newest_obstacles() const;
   Questions questions() const;
   /// What the background work failed with; empty: nothing.
   std::string fault() const;
 
   TripleBuffer<NumberedRequest>& requests() noexcept { return requests_; }
   TripleBuffer<NumberedObstacles>& obstacles() noexcept { return obstacles_; }
-  /// Where the arm was measured in the last step (nv); NaN before the first. Read by one thread at a time.
-  TripleBuffer<Eigen::VectorXd>& measured() noexcept { return measured_; }
-  /// The same; empty before the first step.
+  /// For the step: where the arm is measured (nv). No allocation.
+  void show_measured(const Eigen::VectorXd& q) noexcept {
+    measured_.draft() = q;
+    measured_.submit();
+  }
+  /// Where it was in the last step; empty before the first. For one thread at a time.
   Eigen::VectorXd last_measured() {
     const Eigen::VectorXd& q = measured_.get();
     return q.allFinite() ? q : Eigen::VectorXd();
   }
 
  private:
-  struct All {
-    Request request;
-    std::shared_ptr<const Obstacles> obstacles;
-    Questions questions;
-    std::uint64_t request_count = 0, obstacle_count = 0;
-  };
-  All all() const;
   // With the mutex locked.
-  void show(const All& all);
+  void show(const Newest& newest);
   void show_obstacles(std::shared_ptr<const Obstacles> copy, std::string question, Obstacles obstacles);
   void note_fault(const char* what) noexcept;
 
   TripleBuffer<NumberedRequest> requests_;
   TripleBuffer<NumberedObstacles> obstacles_;
-  TripleBuffer<Eigen::VectorXd> measured_;
-  mutable std::mutex mutex_;  // Guards what follows.
+  TripleBuffer<Eigen::VectorXd> measured_;  // NaN before the first step
+  mutable std::mutex mutex_;                // Guards what follows.
   Request request_;
   std::uint64_t request_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;

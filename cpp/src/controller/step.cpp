@@ -17,8 +17,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   }
   // Measurement = observe(q, v, t)
   measured_.judge(reference_.next_q, last_.acceleration, time);
-  board_.measured().draft() = measured_.position();
-  board_.measured().submit();
+  board_.show_measured(measured_.position());
   dynamics_.observe(measured_.begins(), measured_.velocity(), last_);
   bool& apart = state_.apart = follow_arm();
 
@@ -55,7 +54,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   // Command = tracker(...)
   state_.program = track(state_.program, apart, command_.tracking_error, told);
   if (measured_.bridges_sample()) {  // what is reported is of the arm, as far as it is measured
-    apart = attractor_.look_at_arm(measured_.sample_q(), measured_.sample_v(), obstacles) || apart;
+    apart = attractor_.look_at_arm(measured_.sample_q(), measured_.sample_v(), obstacles, sources_.closing()) || apart;
     command_.tracking_error = (reference_.q - measured_.sample_q()).cwiseAbs().maxCoeff();
   }
   measured_.compare(reference_.next_q);
@@ -63,9 +62,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (!settings.synchronous && (looks || inputs_.goal().asks())) {
     tell_worker(followed, time, inputs_.goal().take_question());
   }
-  last_.acceleration = command_.acceleration;
-  last_.torque = command_.torque;
-  last_.has_torque = model.torque;
+  last_.take(command_.acceleration, command_.torque, model.torque);
   measured_.end_step();
   return command_;
 }
@@ -213,10 +210,9 @@ Lead Controller::Impl::lead(const Goal& followed, bool stale) const noexcept {
 
 TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed,
                                      const ToldDynamics& told) noexcept {
-  const ClosingEstimate& closing = sources_.closing();
   SecondState second;
-  if (apart && attractor_.look_at_arm(measured_.position(), measured_.velocity(), sources_.obstacles())) {
-    second = {&attractor_.corrected_of_arm(closing), &measured_.velocity()};
+  if (apart && attractor_.look_at_arm(measured_.position(), measured_.velocity(), sources_.obstacles(), sources_.closing())) {
+    second = {&attractor_.arm_clearances(), &measured_.velocity()};
   }
   const KinematicState &at_reference = attractor_.at_reference().state(), &at_arm = arm_state(apart);
   if (dynamics_.has_model()) {
@@ -234,8 +230,8 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     dynamics_.update(at_reference, !apart || !dynamics_.has_model() ? told : ToldDynamics{});
   }
-  const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.corrected(closing),
-                                             second, last, solution_, speed_.at_reference());
+  const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
+                                             last, solution_, speed_.at_reference());
   if (model.torque) {
     reference_.torque = solution_.torque;
   }
@@ -272,10 +268,9 @@ TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tra
   if (model.torque) {
     dynamics_.update(attractor_.at_arm().state(), told);
   }
-  return tracker_.track(reference_,
-                        {measured_.position(), measured_.velocity(), attractor_.corrected_of_arm(sources_.closing()), dynamics_,
-                         last_, speed_.at_arm()},
-                        tracking_error, solved);
+  return tracker_.track(
+      reference_, {measured_.position(), measured_.velocity(), attractor_.arm_clearances(), dynamics_, last_, speed_.at_arm()},
+      tracking_error, solved);
 }
 
 const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told) noexcept {

@@ -54,7 +54,7 @@ void Worker::run(GoalFollower& goal, LookAheadFollower& look_ahead) {
 }
 
 Obstacles Worker::obstacles_at(const Snapshot& snapshot) const {
-  const RequestBoard::NewestObstacles newest = board_.numbered_obstacles();
+  const RequestBoard::NewestObstacles newest = board_.newest_obstacles();
   Obstacles now = *newest.obstacles;
   if (newest.number == snapshot.obstacle_number) {
     now.advance(snapshot.obstacle_age);

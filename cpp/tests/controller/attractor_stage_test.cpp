@@ -74,10 +74,11 @@ BOOST_AUTO_TEST_CASE(the_arm_is_looked_at_beside_the_reference) {
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(2), unknown = Eigen::VectorXd::Constant(2, test::not_a_number);
   const Obstacles near = test::ball({0.14, 0.0, 0.75}, 0.05);
   a.attract({a.goal, nullptr, nullptr}, near);
-  BOOST_TEST(a.stage.look_at_arm(a.reference.q, a.reference.v, near));
+  BOOST_TEST(a.stage.look_at_arm(a.reference.q, a.reference.v, near, a.closing));
   BOOST_TEST((a.stage.at_arm().clearances.values == a.stage.at_reference().clearances.values));
-  BOOST_TEST(a.stage.look_at_arm(rest, rest, near));  // upright: the second link is 0.09 m away, not tilted towards it
+  BOOST_TEST(
+      a.stage.look_at_arm(rest, rest, near, a.closing));  // upright: the second link is 0.09 m away, not tilted towards it
   BOOST_TEST(a.stage.at_arm().clearances.least.minCoeff() > a.stage.at_reference().clearances.least.minCoeff());
-  BOOST_TEST(!a.stage.look_at_arm(unknown, rest, near));
-  BOOST_TEST((&a.stage.corrected(a.closing) == &a.stage.at_reference().clearances));  // nothing closes beside what was told
+  BOOST_TEST(!a.stage.look_at_arm(unknown, rest, near, a.closing));
+  BOOST_TEST((&a.stage.clearances() == &a.stage.at_reference().clearances));  // nothing closes beside what was told
 }

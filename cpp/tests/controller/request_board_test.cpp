@@ -1,5 +1,6 @@
 // What was set last, for any thread: numbers, copies and hand-over, without a step.
 #include <boost/test/unit_test.hpp>
+#include <thread>
 #include <stdexcept>
 #include <string>
 
@@ -26,17 +27,17 @@ BOOST_AUTO_TEST_CASE(a_board_numbers_what_is_put_and_hands_it_to_the_step) {
   BOOST_TEST(board.requests().get().number == 1u);
   BOOST_TEST((std::get<VelocityRequest>(board.requests().get().request).velocity == velocity));
   BOOST_TEST(board.obstacles().get().number == 1u);
-  BOOST_TEST((board.newest_obstacles()->points().col(0) == board_place));
+  BOOST_TEST((board.newest_obstacles().obstacles->points().col(0) == board_place));
   BOOST_TEST((board.request(0).index() == 0));  // there is a newer one
   BOOST_TEST((board.request(1).index() != 0));
   BOOST_TEST(board.questions().order == "why so fast?");
   BOOST_TEST(board.questions().order_is_newer);
   board.put(test::ball(board_place, 0.1), "so far away?", nobody);
   BOOST_TEST(!board.questions().order_is_newer);
-  board.number_next(7, 0);
+  board.number_next_request(7);
   board.put(Request(), "");
   BOOST_TEST(board.request_number() == 7u);
-  BOOST_TEST(board.numbered_obstacles().number == 2u);
+  BOOST_TEST(board.newest_obstacles().number == 2u);
 }
 
 BOOST_AUTO_TEST_CASE(only_the_newest_obstacles_are_shared_and_only_the_newest_request_has_a_posture) {
@@ -51,28 +52,50 @@ BOOST_AUTO_TEST_CASE(only_the_newest_obstacles_are_shared_and_only_the_newest_re
   const Posture posture{Eigen::Vector2d(0.3, 0.4), 0.0, 0.0};
   board.put(Goal(JointGoal(Eigen::Vector2d::Zero())), "");
   board.show_posture(0, posture);
-  BOOST_TEST(!board.posture().has_value());
+  BOOST_TEST(!board.newest().posture.has_value());
   board.show_posture(1, posture);
-  BOOST_TEST((board.posture()->q == posture.q));
+  BOOST_TEST((board.newest().posture->q == posture.q));
   board.put(Request(), "");
-  BOOST_TEST(!board.posture().has_value());
+  BOOST_TEST(!board.newest().posture.has_value());
+}
+
+BOOST_AUTO_TEST_CASE(what_belongs_together_is_read_together_while_another_thread_sets_goals) {
+  RequestBoard board(1);
+  std::thread setter([&] {
+    for (std::uint64_t k = 1; k <= 20000; ++k) {
+      const Eigen::VectorXd q = Eigen::VectorXd::Constant(1, static_cast<double>(k));
+      board.put(Goal(JointGoal(q)), "");
+      board.show_posture(k, {q, 0.0, 0.0});
+    }
+  });
+  int with_posture = 0, apart = 0;
+  while (board.request_number() < 20000 || with_posture == 0) {
+    const RequestBoard::Newest newest = board.newest();
+    if (newest.posture) {
+      ++with_posture;
+      apart += newest.posture->q != std::get<JointGoal>(std::get<Goal>(newest.request)).position;
+    }
+  }
+  setter.join();
+  BOOST_TEST(apart == 0);
 }
 
 BOOST_AUTO_TEST_CASE(another_board_takes_over_everything_with_its_numbers) {
   RequestBoard before(2), after(2);
-  before.number_next(5, 9);
+  before.number_next_request(5);
+  before.number_next_obstacles(9);
   before.put(Goal(JointGoal(Eigen::Vector2d(0.1, 0.2))), "a question");
   before.put(test::ball(board_place, 0.1), "", nobody);
   Eigen::Index given = 0;
   after.take_over(before, [&](const Obstacles& obstacles) { given = obstacles.size(); });
   BOOST_TEST(given == 1);
   BOOST_TEST(after.request_number() == 5u);
-  BOOST_TEST(after.numbered_obstacles().number == 9u);
+  BOOST_TEST(after.newest_obstacles().number == 9u);
   BOOST_TEST(after.requests().get().number == 5u);
   BOOST_TEST(after.obstacles().get().number == 9u);
   BOOST_TEST((after.obstacles().get().obstacles.points().col(0) == board_place));
   BOOST_TEST(after.questions().order == "a question");
-  BOOST_TEST((std::get<Goal>(after.newest_request()).index() == 0));
+  BOOST_TEST((std::get<Goal>(after.newest().request).index() == 0));
 }
 
 BOOST_AUTO_TEST_CASE(what_background_work_throws_is_kept_as_a_fault) {

@@ -43,7 +43,7 @@ struct Working {
     Snapshot& s = worker.draft();
     s.time = time;
     s.request_number = request;
-    s.obstacle_number = board.numbered_obstacles().number;
+    s.obstacle_number = board.newest_obstacles().number;
     s.by_pose = by_pose;
     s.places.num = 1;
     s.written = std::chrono::steady_clock::now();
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(a_worker_finds_a_posture_for_the_pose_that_it_is_told_of_an
   const PoseError error = pose_error(pose, test::state_at(w.model.arm.robot(), found.posture.q));
   BOOST_TEST(error.position < 1e-7);  // as Posture::found promises
   BOOST_TEST(error.rotation < 1e-7);
-  BOOST_TEST((w.board.posture()->q == found.posture.q));
+  BOOST_TEST((w.board.newest().posture->q == found.posture.q));
   BOOST_TEST(comes_true([&] { return w.worker.activations().update(); }));  // the end of this look
   w.tell(1, true);                                                          // the same question again is none
   BOOST_TEST(comes_true([&] { return w.worker.activations().update(); }));
@@ -95,7 +95,7 @@ BOOST_AUTO_TEST_CASE(a_worker_lowers_barriers_at_places_among_the_obstacles_that
   Places places(nv);
   places.num = 1;
   GeometricSystem::Workspace workspace(*w.model.system);
-  BOOST_TEST(!w.distances.lower_at(places, *w.board.newest_obstacles(), workspace, expected));
+  BOOST_TEST(!w.distances.lower_at(places, *w.board.newest_obstacles().obstacles, workspace, expected));
   BOOST_TEST(found.request_number == 1u);
   BOOST_TEST((found.values == expected));
   BOOST_TEST((found.values != w.model.system->activations()));
