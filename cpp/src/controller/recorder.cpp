@@ -28,6 +28,47 @@ recording::PoseRecord to_record(const PoseGoal& goal) {
           s.position_stiffness, s.orientation_stiffness, s.posture_stiffness, s.rest};
 }
 
+recording::RequestRecord to_record(std::uint64_t number, const Request& request) {
+  recording::RequestRecord record;
+  record.number = number;
+  // A kind of request that is new does not compile until it is recorded here, and given again in a replay.
+  std::visit(Overloaded{[](const std::monostate&) {},
+                        [&](const Goal& goal) {
+                          if (const auto* joint = std::get_if<JointGoal>(&goal)) {
+                            record.kind = recording::RequestRecord::Kind::joint_goal;
+                            record.position = joint->position;
+                            record.velocity = joint->velocity;
+                            record.acceleration = joint->acceleration;
+                            return;
+                          }
+                          const auto& pose = std::get<PoseGoal>(goal);
+                          record.kind = recording::RequestRecord::Kind::pose_goal;
+                          record.poses.push_back(to_record(pose));
+                          for (const PoseGoal& other : pose.others) {
+                            record.poses.push_back(to_record(other));
+                          }
+                        },
+                        [&](const VelocityRequest& velocity) {
+                          record.kind = recording::RequestRecord::Kind::velocity;
+                          record.velocity = velocity.velocity;
+                        },
+                        [&](const TwistRequest& twist) {
+                          record.kind = recording::RequestRecord::Kind::twist;
+                          record.frame = twist.frame.name;
+                          record.twist = twist.twist;
+                          record.local = twist.local;
+                          record.free_rotation = twist.free == TwistFreedom::rotation;
+                        },
+                        [&](const TrajectoryRequest& trajectory) {
+                          record.kind = recording::RequestRecord::Kind::trajectory;
+                          record.q = trajectory.samples->q;
+                          record.times = trajectory.samples->times;
+                          record.steer = trajectory.behaviour == TrajectoryBehaviour::steer;
+                        }},
+             request);
+  return record;
+}
+
 }  // namespace
 
 bool RecordRing::has_room(std::uint64_t end) noexcept {
@@ -131,7 +172,6 @@ void Recorder::add(std::string_view tag, const Record& record) {
 }
 
 void Recorder::note(const Controller::Impl& newest) {
-  using recording::RequestRecord;
   if (closed_) {
     return;
   }
@@ -151,44 +191,7 @@ void Recorder::note(const Controller::Impl& newest) {
   }
   if (request_number > noted_request_) {
     noted_request_ = request_number;
-    RequestRecord record;
-    record.number = request_number;
-    // A kind of request that is new does not compile until it is recorded here, and given again in a replay.
-    std::visit(Overloaded{[](const std::monostate&) {},
-                          [&](const Goal& goal) {
-                            if (const auto* joint = std::get_if<JointGoal>(&goal)) {
-                              record.kind = RequestRecord::Kind::joint_goal;
-                              record.position = joint->position;
-                              record.velocity = joint->velocity;
-                              record.acceleration = joint->acceleration;
-                              return;
-                            }
-                            const auto& pose = std::get<PoseGoal>(goal);
-                            record.kind = RequestRecord::Kind::pose_goal;
-                            record.poses.push_back(to_record(pose));
-                            for (const PoseGoal& other : pose.others) {
-                              record.poses.push_back(to_record(other));
-                            }
-                          },
-                          [&](const VelocityRequest& velocity) {
-                            record.kind = RequestRecord::Kind::velocity;
-                            record.velocity = velocity.velocity;
-                          },
-                          [&](const TwistRequest& twist) {
-                            record.kind = RequestRecord::Kind::twist;
-                            record.frame = twist.frame.name;
-                            record.twist = twist.twist;
-                            record.local = twist.local;
-                            record.free_rotation = twist.free == TwistFreedom::rotation;
-                          },
-                          [&](const TrajectoryRequest& trajectory) {
-                            record.kind = RequestRecord::Kind::trajectory;
-                            record.q = trajectory.samples->q;
-                            record.times = trajectory.samples->times;
-                            record.steer = trajectory.behaviour == TrajectoryBehaviour::steer;
-                          }},
-               board.request(request_number));
-    add(recording::request_tag, record);
+    add(recording::request_tag, to_record(request_number, board.request(request_number)));
   }
 }
 
