@@ -14,13 +14,13 @@
 
 namespace sidestep {
 
-/// What the reference is led by in a step.
+/// What leads the reference in a step.
 struct Lead {
   const Goal& goal;                      // Goal of the attractor.
   AvoidanceTrajectory const* avoidance;  // Trajectory that takes the place of its attraction; null: none.
-  const Eigen::VectorXd* kept_path;      // the acceleration of a path that is kept, in place of it; null: none
-  double pace = 1.0;                     // share of its speed that the arm has, in [0, 1]
-  bool rests = false;                    // the arm stops
+  const Eigen::VectorXd* kept_path;      // Acceleration of a path that is kept, in place of it; null: none.
+  double pace = 1.0;                     // Share of its speed that the arm may use, in [0, 1].
+  bool rests = false;                    // The arm stops.
 };
 
 /// Stage `attractor`: the acceleration that the goal and the curved space want, at the reference; and the clearances there and at
@@ -32,10 +32,10 @@ class AttractorStage {
   /// Writes the wanted acceleration of the reference among the obstacles.
   StepStatus attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles, const ClosingEstimate& closing,
                      Eigen::VectorXd& wanted) noexcept;
-  /// The clearances of the arm, where it is not exactly where the reference is; false where they are unusable.
+  /// Evaluates the clearances of the arm, which is not exactly where the reference is; false if they are unusable.
   bool look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
                    const ClosingEstimate& closing) noexcept;
-  /// The clearances at the reference alone, as a step has left them.
+  /// Evaluates the clearances at the reference, after another arm has taken over.
   void look_at_reference(const Reference& reference, const Goal& goal, const Obstacles& obstacles) noexcept;
 
   /// Clearances of the last `attract` and of the last `look_at_arm`, with the closings that nobody told.
@@ -48,7 +48,7 @@ class AttractorStage {
   Eigen::VectorXd& activations() noexcept { return reference_.activations; }
 
  private:
-  /// Leaves out the push out of what is in doubt, where nothing else asks for one.
+  /// Removes the recovery from obstacles that are in doubt, if nothing else needs it.
   void wait_in_doubt(const ClosingEstimate& closing, Eigen::VectorXd& wanted) const noexcept;
 
   const std::shared_ptr<const GeometricSystem> system_;

@@ -64,11 +64,11 @@ class GoalFollower : private GoalMemory {
   void begin_step() noexcept { taken_ = {}; }
   /// Another request was taken over; `goal`: it is a goal.
   void leave(bool goal) noexcept;
-  /// The motion begins anew: a posture and a path are looked for from here. `has_goal`: a goal is followed, and no input.
+  /// The motion begins anew: the next step searches a posture and a path from here. `has_goal`: a goal is followed, and no input.
   void begin_anew(bool has_goal) noexcept;
-  /// The goal begins, once the state is known. True where another way than before has to be found.
+  /// The goal begins, once the state is known. True if a new way must be found.
   bool begin(Goal& goal, bool moves, const Moment& now) noexcept;
-  /// What the reference is led by at the moment. `pose`: the goal, where it is a pose; `avoids`: the arm is led away.
+  /// The goal that leads the reference now. `pose`: the goal that was set, if it is a pose; `avoids`: the look-ahead leads the arm.
   const Goal& lead(const PoseGoal* pose, const Moment& now, bool avoids) noexcept;
   /// The reference stays where it is.
   const Goal& rest_at(const Eigen::VectorXd& q) noexcept;
@@ -83,24 +83,24 @@ class GoalFollower : private GoalMemory {
   void set_rests(bool is) noexcept { rests = is; }
   /// The end of an input is a goal, which begins.
   void begin_next() noexcept { begins = true; }
-  /// Another arm takes over: the target stays, a way to it is looked for anew. `has_goal_at_rest`: a goal that does not move is set.
+  /// Another arm takes over: the target stays, and a new way to it is searched. `has_goal_at_rest`: a goal is set and does not move.
   void go_on_from(const GoalFollower& before, bool has_goal_at_rest) noexcept;
   /// Whether the worker is asked for a posture; `take_question` says so once.
   bool asks() const noexcept { return asks_worker; }
   bool take_question() noexcept { return std::exchange(asks_worker, false); }
 
-  /// The way to the goal, of an arm that has rested short of it for so long [s]. `followed`: by which the reference is led.
+  /// The way to the goal for an arm that has rested short of it for `rest_time` [s]. `followed`: the goal that leads the reference.
   Way way(double rest_time, const Goal* followed) const noexcept;
-  /// The target is inside something, and the arm goes straight to it: it stops before.
+  /// Whether the arm stops before its target: it goes straight there, and the target is inside something.
   bool stops_short(const Goal* followed) const noexcept;
-  /// Writes near which configurations activation distances shrink.
+  /// Writes the configurations near which activation distances shrink.
   void write_places(Places& places) const noexcept;
-  /// Where `followed` is on the planner's path; number 0 where it is not led by one.
+  /// Where `followed` is on the planner's path; number 0 if it does not follow one.
   OnlinePlanner::Following following(const Goal* followed) const noexcept;
   bool is_on_path(const Goal* followed) const noexcept {
     return planner_ && followed == &led && planner_->following().route_number != 0;
   }
-  /// How old what the planner looked at is [s].
+  /// Age of the state that the planner looked at last [s].
   double planner_age(double time) const noexcept { return planner_ && has_target ? planner_->age(time) : 0.0; }
 
   bool begins_goal() const noexcept { return begins; }
