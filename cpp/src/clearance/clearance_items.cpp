@@ -153,6 +153,7 @@ ClearanceItems::ClearanceItems(Robot robot, const Body& body, const std::vector<
     gravity_torque_ = std::make_shared<GravityTorqueLimit>(*std::move(gravity_torque));
   }
   add_obstacles(items_, robot_, *links_);
+  num_obstacles_ = size();
   if (pairs_) {
     add_pairs(items_, robot_, *links_, *pairs_);
   }

@@ -79,34 +79,12 @@ const ClearanceQuery::Workspace::Pose& ClearanceQuery::pose(const Workspace& w, 
   return joint < 0 ? world : w.poses_[static_cast<std::size_t>(joint)];
 }
 
-ClearanceQuery::Nearest ClearanceQuery::nearest(ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                                Workspace& w) const noexcept {
+ClearanceQuery::Nearest ClearanceQuery::nearest_of(int begin, int end, ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                                   Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   Nearest nearest{cap};
-  for (int i = 0; i < num_items(); ++i) {
-    const Found found = measure((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
-    if (found.clearance < nearest.clearance) {
-      nearest = {found.clearance, i, found.point};
-    }
-  }
-  return nearest;
-}
-
-ClearanceQuery::Nearest ClearanceQuery::nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                                Workspace& w) const noexcept {
-  w.field_.follow(obstacles);
-  place(q, w);
-  const Found found = measure((*items_)[item], obstacles, {cap, infinity, -infinity}, w);
-  return {found.clearance, found.clearance < cap ? item : -1, found.point};
-}
-
-ClearanceQuery::Nearest ClearanceQuery::nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap,
-                                                         Workspace& w) const noexcept {
-  w.field_.follow(obstacles);
-  place(q, w);
-  Nearest nearest{cap};
-  for (int i = 0; i < num_items() && label(i).kind == CoordinateLabel::Kind::obstacle; ++i) {  // they come first
+  for (int i = begin; i < end; ++i) {
     const Found found = measure((*items_)[i], obstacles, {nearest.clearance, infinity, -infinity}, w);
     if (found.clearance < nearest.clearance) {
       nearest = {found.clearance, i, found.point};
@@ -123,7 +101,7 @@ double ClearanceQuery::nearest_moving(ConstVectorRef q, const Obstacles& obstacl
   place(q, w);
   for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
     const double speed = obstacles.velocities().col(n).norm();
-    for (int i = 0; speed > 0.0 && i < num_items() && label(i).kind == CoordinateLabel::Kind::obstacle; ++i) {
+    for (int i = 0; speed > 0.0 && i < items_->num_obstacles(); ++i) {
       const int link = (*items_)[i].link;
       const double away = (obstacles.points().col(n) - w.centres_[static_cast<std::size_t>(link)]).norm();
       nearest = std::min(nearest, away - items_->links()[link].radius - obstacles.radii()[n] - time * speed);

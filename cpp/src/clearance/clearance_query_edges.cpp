@@ -148,7 +148,8 @@ bool ClearanceQuery::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacl
         double slope = 0.0;
         const double least = margin_at(i, w.q_, margins, slope);
         const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};
-        const double slack_here = slack(i, margins), enough = least - slack_here + moved.distance(at.half);
+        const double slack = std::min(margins.slack, 0.5 * item.most_margin);
+        const double enough = least - slack + moved.distance(at.half);
         const double clearance = measure(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
         if (clearance < least) {
           w.last_ = i;
@@ -156,7 +157,7 @@ bool ClearanceQuery::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacl
         }
         if (clearance < enough) {
           open[word] |= std::uint64_t{1} << bit;
-          decided = std::min(decided, moved.share(clearance - least + slack_here));
+          decided = std::min(decided, moved.share(clearance - least + slack));
         }
       }
     }
@@ -169,6 +170,16 @@ bool ClearanceQuery::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacl
         std::copy_n(open, words, w.open_.data() + w.intervals_.size() * words);
         w.intervals_.push_back({middle, half});
       }
+    }
+  }
+  return true;
+}
+
+bool ClearanceQuery::path_free(const std::vector<Eigen::VectorXd>& path, const Obstacles& obstacles, const Margins& margins,
+                               Workspace& w) const noexcept {
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    if (!edge_free(path[k - 1], path[k], obstacles, margins, w)) {
+      return false;
     }
   }
   return true;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace sidestep {
 
@@ -39,14 +40,11 @@ bool KeptPath::is_free_from(double station, const ClearanceQuery& body, const Ob
   Margins margins = margins_;
   margins.margin *= 0.5;
   margins.pair_margin *= 0.5;
-  Eigen::VectorXd from = at(station);
+  std::vector<Eigen::VectorXd> rest{at(station)};
   for (Eigen::Index next = waypoint_after(station); next < waypoints_.cols(); ++next) {
-    if (!body.edge_free(from, waypoints_.col(next), obstacles, margins, w)) {
-      return false;
-    }
-    from = waypoints_.col(next);
+    rest.push_back(waypoints_.col(next));
   }
-  return true;
+  return body.path_free(rest, obstacles, margins, w);
 }
 
 }  // namespace sidestep

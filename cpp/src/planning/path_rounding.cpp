@@ -62,16 +62,12 @@ bool RoundedPath::corner_is_free(std::size_t k, const ClearanceQuery& body, cons
   const double sagitta = 0.5 * half * half * 0.75 * turn / half * reach;
   const int chords = std::clamp(static_cast<int>(std::ceil(std::sqrt(sagitta / deviation))), 2, most_chords);
   Point point;
-  at(corners_[k].station - half, point);
-  Eigen::VectorXd from = point.q;
-  for (int i = 1; i <= chords; ++i) {
+  std::vector<Eigen::VectorXd> curve;
+  for (int i = 0; i <= chords; ++i) {
     at(corners_[k].station + half * (2.0 * i / chords - 1.0), point);
-    if (!body.edge_free(from, point.q, obstacles, margins, workspace)) {
-      return false;
-    }
-    from = point.q;
+    curve.push_back(point.q);
   }
-  return true;
+  return body.path_free(curve, obstacles, margins, workspace);
 }
 
 void RoundedPath::at(double station, Point& point) const {

@@ -167,14 +167,6 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const ClearanceQuery& body,
   }
   const Eigen::VectorXd slow = slowness(body.robot());
   way = skip(way, body, obstacles, margins, workspace);
-  const auto free = [&](const Waypoints& between) {
-    for (std::size_t k = 1; k < between.size(); ++k) {
-      if (!body.edge_free(between[k - 1], between[k], obstacles, margins, workspace)) {
-        return false;
-      }
-    }
-    return true;
-  };
   int missed = 0;
   for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted(); ++attempt) {
     const Stretch stretch(way, slow, random);
@@ -184,7 +176,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const ClearanceQuery& body,
     }
     const auto joint = static_cast<Eigen::Index>(random.uniform(0.0, static_cast<double>(path.rows())));
     for (const Waypoints& between : {stretch.straight(), stretch.evened(joint)}) {
-      if (stations(between, slow).back() < stretch.length() - gain && free(between)) {
+      if (stations(between, slow).back() < stretch.length() - gain && body.path_free(between, obstacles, margins, workspace)) {
         way = stretch.with(between);
         missed = 0;
         break;

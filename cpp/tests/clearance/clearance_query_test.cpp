@@ -84,6 +84,8 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
     // The field's clearance of points outside is their distance.
     by_link(ClearanceBarrier(robot, body, f, cold), CoordinateLabel::Kind::obstacle, true);
     BOOST_TEST(std::abs(checked.nearest(q, obstacles, cap, w).clearance - found.minCoeff()) < 1e-12);  // rounding
+    const double obstacle = found.head(checked.items().num_obstacles()).minCoeff();
+    BOOST_TEST(std::abs(checked.nearest_obstacle(q, obstacles, cap, w).clearance - obstacle) < 1e-12);  // rounding
     BOOST_TEST(checked.free(q, obstacles, none, w) == (found.minCoeff() >= 0.0));
   }
 }
@@ -183,7 +185,7 @@ BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
 
 BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
   Random random(3);
-  int free = 0, blocked = 0, thin = 0;
+  int free = 0, blocked = 0, thin = 0, half = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const Robot robot = test::random_tree(random, 5);
     const ClearanceQuery checked(robot, calibrated(random, robot, 0.01), {{"link0", "link4"}});
@@ -203,7 +205,9 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
       below += clearance < margins.margin - margins.slack;
       least = std::min(least, clearance);
     }
-    const bool said = checked.edge_free(a, b, obstacles, margins, w);
+    const bool said = checked.edge_free(a, b, obstacles, margins, w), on = checked.edge_free(b, -a, obstacles, margins, w);
+    BOOST_TEST(checked.path_free({a, b, -a}, obstacles, margins, w) == (said && on));
+    half += said != on;
     if (said) {
       ++free;
       BOOST_TEST(least >= margins.margin - margins.slack);
@@ -216,7 +220,8 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
   }
   BOOST_TEST(free > 30);
   BOOST_TEST(blocked > 30);
-  BOOST_TEST(thin > 3);  // obstacles that samples 50 times coarser would have stepped over
+  BOOST_TEST(half > 30);  // paths of which one edge is free
+  BOOST_TEST(thin > 3);   // obstacles that samples 50 times coarser would have stepped over
 }
 
 BOOST_AUTO_TEST_CASE(an_edge_through_a_table_has_no_gap) {

@@ -62,6 +62,7 @@ class ClearanceItems {
   const BodyLinks& links() const noexcept { return *links_; }
 
   int size() const noexcept { return static_cast<int>(items_.size()); }
+  int num_obstacles() const noexcept { return num_obstacles_; }  ///< Number of items of obstacles.
   const ClearanceItem& operator[](int i) const noexcept { return items_[static_cast<std::size_t>(i)]; }
 
   // Groups of clearances; null where there are none.
@@ -86,6 +87,7 @@ class ClearanceItems {
   std::shared_ptr<const TableClearances> tables_;
   std::shared_ptr<const GravityTorqueLimit> gravity_torque_;
   std::vector<ClearanceItem> items_;
+  int num_obstacles_;
   Eigen::VectorXd reach_;
   Eigen::MatrixXd reaches_, bends_;
 };

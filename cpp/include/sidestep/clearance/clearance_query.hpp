@@ -19,7 +19,7 @@ namespace sidestep {
 /// Clearances of an arm, see ClearanceItems, in three forms:
 ///
 ///   nearest           at a configuration, by positions alone: `nearest`, `clearances`, `distance_left`, `free`;
-///   along an edge     everywhere between two configurations: `edge_free`;
+///   along an edge     everywhere between two configurations: `edge_free`, `path_free`;
 ///   with derivatives  at a state, for barriers: ClearanceGroup::evaluate of a group of `items()`.
 ///
 /// The first two agree with the third except for obstacles. There they give the signed distance of the obstacles' balls from the
@@ -97,13 +97,17 @@ class ClearanceQuery {
     int item = -1;   ///< Index of the item; -1: all are as far as `cap`.
     int point = -1;  ///< Index of the obstacle point, for an item of obstacles.
   };
-  Nearest nearest(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
-
+  Nearest nearest(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept {
+    return nearest_of(0, num_items(), q, obstacles, cap, w);
+  }
   /// The same of one item.
-  Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
-
+  Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept {
+    return nearest_of(item, item + 1, q, obstacles, cap, w);
+  }
   /// The same of the obstacles alone, without planes and pairs.
-  Nearest nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
+  Nearest nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept {
+    return nearest_of(0, items_->num_obstacles(), q, obstacles, cap, w);
+  }
 
   /// The clearance of every item, not above `cap` [m], into out (num_items).
   void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
@@ -124,16 +128,14 @@ class ClearanceQuery {
     return of.is_own() ? std::min({margins.pair_margin, margins.margin, of.most_margin}) : margins.margin;
   }
 
-  /// Slack of an item between checked configurations [m].
-  double slack(int item, const Margins& margins) const noexcept {
-    return std::min(margins.slack, 0.5 * (*items_)[item].most_margin);
-  }
-
   /// Whether every item keeps its margin at q. Ends at the first that does not.
   bool free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept;
 
   /// Whether every item keeps its margin, less the slack, everywhere on the straight edge from a to b.
   bool edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
+                 Workspace& w) const noexcept;
+  /// The same of all edges from one configuration (nv) of a path to the next. Ends at the first that is not.
+  bool path_free(const std::vector<Eigen::VectorXd>& path, const Obstacles& obstacles, const Margins& margins,
                  Workspace& w) const noexcept;
 
   /// Bound of the relative motion of a point of `item` for a displacement of the joints [m].
@@ -153,6 +155,8 @@ class ClearanceQuery {
     int point;
   };
 
+  /// The smallest clearance of the items from `begin` up to, not including, `end`.
+  Nearest nearest_of(int begin, int end, ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
   std::size_t words() const noexcept { return (static_cast<std::size_t>(items_->size()) + 63) / 64; }
   void place(ConstVectorRef q, Workspace& w) const noexcept;
   void move(ConstVectorRef velocity, Workspace& w) const noexcept;
