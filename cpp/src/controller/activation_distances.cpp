@@ -1,5 +1,7 @@
 #include "activation_distances.hpp"
 
+#include <algorithm>
+
 #include "sidestep/planning/timed_path.hpp"
 
 namespace sidestep {
@@ -19,10 +21,8 @@ bool ActivationDistances::lower_at(const Places& places, const Obstacles& obstac
   bool inside = false;
   for (Eigen::Index k = 0; k < places.num; ++k) {
     static_cast<void>(system_->lower_activations(places.q.col(k), obstacles, workspace, activations));
-    inside = false;
-    for (const Eigen::Index i : clearances_) {
-      inside = inside || workspace.clearances.least[i] < 0.0;
-    }
+    inside = std::any_of(clearances_.begin(), clearances_.end(),
+                         [&](Eigen::Index i) { return workspace.clearances.least[i] < 0.0; });
   }
   return inside;
 }

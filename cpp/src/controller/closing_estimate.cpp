@@ -238,13 +238,8 @@ const Clearances& ClosingEstimate::corrected(const Clearances& seen, Clearances&
 }
 
 double ClosingEstimate::nearest(double duration) const noexcept {
-  double least = infinity;
-  for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
-    if (speeds_[k] > 0.0) {
-      least = std::min(least, now_.values[k] - speeds_[k] * (time_ - last_kept_ + duration));
-    }
-  }
-  return least;
+  const double since = time_ - last_kept_ + duration;
+  return (speeds_.array() > 0.0).select(now_.values.array() - speeds_.array() * since, infinity).minCoeff();
 }
 
 }  // namespace sidestep

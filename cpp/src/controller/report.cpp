@@ -119,23 +119,19 @@ void Controller::Impl::report_position(const Eigen::VectorXd& q) noexcept {
 void Controller::Impl::report_clearance(bool apart) noexcept {
   command_.clearance = infinity;
   command_.coordinate = command_.point = -1;
-  const Clearances* nearest = nullptr;
   const auto take_nearest = [&](const Clearances& clearances) {
     for (const Eigen::Index k : model.clearances) {
       if (clearances.least[k] < command_.clearance) {
+        const CoordinateLabel& label = model.system->labels()[static_cast<std::size_t>(k)];
         command_.clearance = clearances.least[k];
         command_.coordinate = static_cast<int>(k);
-        nearest = &clearances;
+        command_.point = label.kind == CoordinateLabel::Kind::obstacle ? clearances.nearest[k] : -1;
       }
     }
   };
   take_nearest(attractor_.at_reference().clearances);
   if (apart) {
     take_nearest(attractor_.at_arm().clearances);
-  }
-  if (nearest != nullptr &&
-      model.system->labels()[static_cast<std::size_t>(command_.coordinate)].kind == CoordinateLabel::Kind::obstacle) {
-    command_.point = nearest->nearest[command_.coordinate];
   }
 }
 

@@ -188,14 +188,6 @@ void LookAhead::reset() noexcept {
   until_look_ = 0.0;
 }
 
-double LookAhead::obstacle_clearance(const Clearances& clearances) const noexcept {
-  double least = infinity;
-  for (const Eigen::Index k : of_obstacles_) {
-    least = std::min(least, clearances.values[k]);
-  }
-  return least;
-}
-
 void LookAhead::check_interrupted() const {
   if (interrupted_()) {
     throw Interruption();
@@ -218,7 +210,10 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
     wanted = workspace_.acceleration;
   }
   ++stepper.steps;
-  const double clearance = sees ? obstacle_clearance(workspace_.clearances) : -infinity;
+  double clearance = sees ? infinity : -infinity;
+  for (const Eigen::Index k : of_obstacles_) {
+    clearance = std::min(clearance, workspace_.clearances.values[k]);
+  }
   const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
   if (stepper.program.settings().by_torque) {
     dynamics_->mass_matrix(motion.q, *dynamics_workspace_, mass_);

@@ -125,7 +125,6 @@ class LookAhead {
   /// Least clearance [m] of a motion up to the horizon; ends at any that is at most `enough`. If it collides, the rest of the
   /// horizon is subtracted, at 1 m/s, so that later collisions rank higher.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
-  double obstacle_clearance(const Clearances& clearances) const noexcept;
   /// Random trajectories from a state, those first whose references get farthest before the body is deep in an
   /// obstacle.
   std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
