@@ -90,7 +90,7 @@ class Bench:
         plant, problem = CELLS[cell], self.problem(index)
         settings = ss.ControllerSettings(synchronous=True, seed=index, period=1.0 / plant.rate, output=output)
         controller = ss.Controller(self.arm, settings)
-        controller.set_obstacles(problem.obstacles)
+        controller.set_obstacles(problem.obstacles, valid_for=np.inf)
         controller.set_goal(problem.goal)
         simulated = SimulatedArm(self.robot, problem.objects, plant, output)
         document: dict[str, Any] = {"robot": self.robot.name, "cell": cell, "index": index}

@@ -105,7 +105,7 @@ class Bench:
                 synchronous=True, seed=index, period=PERIOD, planner=None, output="position"
             ),
         )
-        controller.set_obstacles(problem.obstacles)
+        controller.set_obstacles(problem.obstacles, valid_for=np.inf)
         q, v = problem.start.copy(), np.zeros_like(problem.start)
         times, per_tick = TICK * np.arange(CHUNK), round(TICK / PERIOD)
         rows, lag, arrived_at = [], 0.0, None

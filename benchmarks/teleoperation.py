@@ -95,7 +95,7 @@ class Bench:
         problem, kind = self.problem(index), KINDS[index % len(KINDS)]
         operator = Operator(kind, self, problem, np.random.default_rng((43, index)))
         controller = ss.Controller(self.arm, ss.ControllerSettings(synchronous=True, seed=index))
-        controller.set_obstacles(problem.obstacles)
+        controller.set_obstacles(problem.obstacles, valid_for=np.inf)
         told: list[np.ndarray | None] = []
 
         def tell(time: float, q: np.ndarray, v: np.ndarray) -> None:

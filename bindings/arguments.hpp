@@ -4,6 +4,7 @@
 #include <nanobind/ndarray.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -87,6 +88,9 @@ void check_fitted_to(const Robot& robot, const Body& body);
 
 /// Obstacles as they are; a shape, or a list of shapes and obstacles, by `sidestep.obstacles.obstacles_from_shapes`.
 Obstacles as_obstacles(nb::handle value);
+
+/// A pose (4, 4), or a position (3,) where `position_only`; warns of a rotation that was rounded, and takes the nearest.
+Eigen::Isometry3d as_pose(nb::handle value, bool position_only = false);
 
 inline bool is_object(nb::handle) { return true; }
 

@@ -57,6 +57,7 @@ void bind_settings_tree(nb::module_& m) {
       "Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between\n"
       "near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].");
   bind_settings<InputSettings>(m, "InputSettings", "How velocities, twists and trajectories are followed, see Controller.");
+  bind_settings<SourceSettings>(m, "SourceSettings", "How long obstacles are believed, see Controller.set_obstacles.");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
       {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
@@ -81,7 +82,7 @@ void bind_settings_tree(nb::module_& m) {
       {part("barriers", "BarrierSettings", &S::barriers), part("safety", "SafetySettings", &S::safety),
        part("arrival", "ArrivalSettings", &S::arrival), part("tracking", "TrackingSettings", &S::tracking),
        part("speed_limits", "SpeedLimitSettings | None", &S::speed_limits),
-       part("inputs", "InputSettings", &S::inputs),
+       part("inputs", "InputSettings", &S::inputs), part("sources", "SourceSettings", &S::sources),
        part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
@@ -92,6 +93,7 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("arrival", &S::arrival)
       .def_rw("tracking", &S::tracking)
       .def_rw("inputs", &S::inputs)
+      .def_rw("sources", &S::sources)
       .def_rw("output", &S::output)
       .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.");
   optional_part(c, "speed_limits", "SpeedLimitSettings", &ControllerSettings::speed_limits);
@@ -110,6 +112,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<TrackingSettings>(rows, "tracking.");
         describe_fields<SpeedLimitSettings>(rows, "speed_limits.", true);
         describe_fields<InputSettings>(rows, "inputs.");
+        describe_fields<SourceSettings>(rows, "sources.");
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
         describe_fields<PlannerSettings>(rows, "planner.search.", true);
         describe_fields<TimedPathSettings>(rows, "planner.route.", true);
@@ -135,7 +138,7 @@ void bind_command(nb::module_& m) {
       .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, velocity, acceleration or Cartesian speed gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin or position limit can be kept; nothing is touched.")
       .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its measured position: it comes to rest.")
-      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.")
+      .value("stale", SafetyStatus::stale, "A source of obstacles is overdue, or none was ever set: the arm stops.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the quadratic program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "A covering ellipsoid of the arm reaches into an obstacle, a plane or another link.");
   nb::enum_<Activity>(m, "Activity", "What a controller is doing.")
@@ -344,18 +347,6 @@ void bind_controller(nb::module_& m) {
            "Restarts the reference at the measured state of the next step: call it after something else has moved the arm. The goal\n"
            "stays. Without this call the reference restarts once five measured positions in a row agree with each other but not\n"
            "with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
-      .def(
-          "set_obstacles", [](Controller& self, nb::handle obstacles) {
-            self.set_obstacles(as_obstacles(obstacles));
-            if (const std::string question = self.questions().obstacles; !question.empty()) {
-              warn(question);
-            }
-          },
-          nb::arg("obstacles").none(),
-          nb::sig("def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | "
-                  "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
-          "Replaces all obstacles, from the next step on: points, a shape, or a list of both. Balls cover each shape without gaps,\n"
-          "see `sidestep.obstacles.obstacles_from_shapes`. Obstacles move on by their velocities until the next call.")
       .def(
           "set_arm",
           [](Controller& self, nb::handle other) {

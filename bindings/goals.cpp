@@ -40,8 +40,6 @@ Goal as_goal(nb::handle value, Eigen::Index nv) {
   return JointGoal(as_vector(value, "goal", nv));
 }
 
-namespace {
-
 Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
   const Array array = as_array(value, "pose");
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -73,6 +71,8 @@ Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
   }
   return pose;
 }
+
+namespace {
 
 nb::tuple pose_goal_state(const PoseGoal& g) {
   const PoseGoal::MadeFor& made_for = g.made_for();

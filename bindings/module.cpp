@@ -20,6 +20,7 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_arm(m);
   sidestep::python::bind_recording(m);
   sidestep::python::bind_controller(m);
+  sidestep::python::bind_sources(m);
   sidestep::python::bind_real_time(m);
   sidestep::python::bind_thesis(m);
 }

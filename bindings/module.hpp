@@ -16,6 +16,7 @@ void bind_batch(nanobind::module_& m);
 void bind_guidance(nanobind::module_& m);
 void bind_arm(nanobind::module_& m);
 void bind_controller(nanobind::module_& m);
+void bind_sources(nanobind::module_& m);
 void bind_real_time(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
 void bind_thesis(nanobind::module_& m);

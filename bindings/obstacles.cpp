@@ -132,9 +132,22 @@ void bind_obstacles(nb::module_& m) {
                      return groups;
                    },
                    "Of what belongs together, in the order of the points: its name, None where it has none, and how many.")
-      .def("named", &Obstacles::named, nb::arg("names"), nb::arg("counts"),
+      .def(
+          "named",
+          [](const Obstacles& o, std::vector<std::string> names, const std::vector<Eigen::Index>& counts, nb::handle poses) {
+            std::vector<Eigen::Isometry3d> placed;
+            if (!poses.is_none()) {
+              for (const nb::handle pose : nb::cast<nb::list>(poses)) {
+                placed.push_back(as_pose(pose));
+              }
+            }
+            return o.named(std::move(names), counts, std::move(placed));
+          },
+          nb::arg("names"), nb::arg("counts"), nb::arg("poses") = nb::none(),
+          nb::sig("def named(self, names: collections.abc.Sequence[str], counts: collections.abc.Sequence[int], "
+                  "poses: list[numpy.typing.NDArray[numpy.float64]] | None = None) -> Obstacles"),
            "The same points with the names of what they belong to: the first counts[0] points to names[0], and so on;\n"
-           "an empty name is none. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.")
+           "an empty name is none. poses: (4, 4) of each in the world, by which Controller.move_obstacle moves it. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.")
       .def(
           "name_of",
           [](const Obstacles& o, Eigen::Index point) {

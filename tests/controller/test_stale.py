@@ -1,4 +1,4 @@
-"""Obstacles that are too old, or that were never set."""
+"""Obstacles that are too old."""
 
 from __future__ import annotations
 
@@ -28,20 +28,6 @@ def test_old_obstacles_are_a_status_between_lost_margins_and_stops(planar: ss.Ar
     controller.set_obstacles(ss.Obstacles.none())
     command = controller.step(motion.last_q, motion.last_v)
     assert (command.status < ss.SafetyStatus.stale, command.activity) == (True, ss.Activity.moving)
-
-
-def test_obstacles_that_were_never_set_are_stale_where_a_timeout_is(planar: ss.Arm) -> None:
-    controller = ss.Controller(planar, ss.ControllerSettings(synchronous=True, obstacle_timeout=0.05))
-    controller.set_goal(GOAL)
-    motion = ss.integrate(controller, START, np.zeros(3), steps=100)
-    assert set(motion.statuses) == {ss.SafetyStatus.stale}
-    np.testing.assert_array_equal(motion.last_q, START)
-    assert controller.explain() == (
-        "stopped: obstacle_timeout is set, but set_obstacles was never called; "
-        "pass Obstacles.none() for a free workspace"
-    )
-    controller.set_obstacles(ss.Obstacles.none())
-    assert controller.step(START, np.zeros(3)).status < ss.SafetyStatus.stale
 
 
 def test_contact_is_worse_than_old_obstacles(planar: ss.Arm) -> None:

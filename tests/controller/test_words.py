@@ -160,8 +160,7 @@ def test_timeouts_are_told_in_seconds() -> None:
     )
     ss.integrate(c, START, np.zeros(3), steps=300)
     assert c.explain() == (
-        "stopped: the obstacles are 0.6 s old, more than obstacle_timeout (0.5 s); "
-        "set_obstacles must be called more often"
+        "stopped: source 'scene' is 0.60 s old and valid for 0.50 s; the arm goes on when it comes again"
     )
 
 

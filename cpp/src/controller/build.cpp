@@ -14,7 +14,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
     : model(std::move(a), std::move(s)),
       board_(model.arm.num_coordinates()),
       measured_(model.arm.robot(), model.joints, model.plausible, model.settings, sidestep::drives_track(model.settings)),
-      sources_(board_.obstacles(), model.body, model.arm.robot(), model.arm.body(), model.settings),
+      sources_(board_.worlds(), model.body, model.arm.robot(), model.arm.body(), model.settings),
       inputs_(board_, model.body, model.arm.robot(), model.joints, model.settings, model.usable, model.clearances,
               model.dynamics, works),
       look_ahead_(model.system, model.settings, model.dynamics),

@@ -157,7 +157,7 @@ std::string Controller::attach(const Attachment& object) {
   {
     const std::lock_guard orders(setters_);
     last.q = newest().board().last_measured();
-    around = *newest().board().newest_obstacles().obstacles;
+    around = newest().board().newest_world()->obstacles;
   }
   if (!object.rests_on.empty()) {
     if (last.q.size() == 0) {

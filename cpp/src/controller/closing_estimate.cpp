@@ -216,6 +216,19 @@ void ClosingEstimate::advance(double time) noexcept {
   }
 }
 
+void ClosingEstimate::widen(const Obstacles* obstacles, const std::array<Widening, most_sources>& parts) noexcept {
+  widened_ = obstacles;
+  widenings_ = parts;
+}
+
+double ClosingEstimate::widening(Eigen::Index point) const noexcept {
+  if (widened_ == nullptr) {
+    return 0.0;
+  }
+  const Widening& part = widenings_[widened_->part_of(point)];
+  return part.reach + widened_->uncertainty()[point] * part.age;
+}
+
 const Clearances& ClosingEstimate::corrected(const Clearances& seen, Clearances& out) const noexcept {
   if (!changes()) {
     return seen;
@@ -232,6 +245,10 @@ const Clearances& ClosingEstimate::corrected(const Clearances& seen, Clearances&
     } else if (is_doubted(k)) {
       approach.values[k] = std::max(approach.values[k], std::min(margin_, out.margins[k]));
       out.least[k] = std::max(out.least[k], 0.0);
+    }
+    if (const double reach = widening(out.nearest[k]); reach > 0.0) {
+      const double margin = std::min(margin_, out.margins[k]);
+      approach.values[k] = std::min(approach.values[k], std::max(approach.values[k] - reach, margin));
     }
   }
   return out;

@@ -13,6 +13,7 @@
 #include "sidestep/robot/kinematic_state.hpp"
 #include "sidestep/robot/robot.hpp"
 #include "sidestep/scene/obstacles.hpp"
+#include "world.hpp"
 
 namespace sidestep {
 
@@ -52,8 +53,17 @@ class ClosingEstimate {
   /// Moves on to `time` [s]: what is late ends. Once in each step, after `take`.
   void advance(double time) noexcept;
 
+  /// How far points of a part may be from where they are believed to be: reach + uncertainty of their velocity × age.
+  struct Widening {
+    double reach = 0.0;  // [m]
+    double age = 0.0;    // [s]
+  };
+  /// Clearances count as smaller by that until the next call, but the arm is not led away for it: never as less than their margin.
+  /// Null: none is wider. Not kept beyond a step.
+  void widen(const Obstacles* obstacles, const std::array<Widening, most_sources>& parts) noexcept;
+
   /// Whether `corrected` would change anything.
-  bool changes() const noexcept { return num_closing_ > 0 || num_doubted_ > 0; }
+  bool changes() const noexcept { return num_closing_ > 0 || num_doubted_ > 0 || widened_ != nullptr; }
   /// The same clearances with the closings found and the doubts: `seen` itself where there are none, else `out`, which is written.
   const Clearances& corrected(const Clearances& seen, Clearances& out) const noexcept;
 
@@ -82,6 +92,8 @@ class ClosingEstimate {
   };
 
   void evaluate(const Obstacles& obstacles, Clearances& out) noexcept;
+  /// How much smaller the clearance to a point counts [m].
+  double widening(Eigen::Index point) const noexcept;
   void keep(Track& track, double duration) noexcept;
   /// The closing speed that a track's changes agree on [m/s], 0: none; `closes`: there was one before.
   static double agreed(const Track& track, bool closes) noexcept;
@@ -102,6 +114,8 @@ class ClosingEstimate {
   double late_ = 0.0, time_ = 0.0;           // [s] when the newest set is late; now
   bool begun_ = false;                       // a set was taken
   int num_closing_ = 0, num_doubted_ = 0;
+  const Obstacles* widened_ = nullptr;
+  std::array<Widening, most_sources> widenings_{};  // of each part
 };
 
 }  // namespace sidestep

@@ -1,18 +1,19 @@
 // The public face, and what is set from any thread.
 #include "sidestep/controller/controller.hpp"
 
+#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "impl.hpp"
 #include "recorder.hpp"
+#include "source_registry.hpp"
 
 namespace sidestep {
 
-void Controller::Impl::set_obstacles(Obstacles obstacles) {
-  std::string question = model.plausible.question(obstacles);
-  board_.put(std::move(obstacles), std::move(question), [this](const Obstacles& shared) { share_with_planner(shared); });
+void Controller::Impl::put(World world, std::string question) {
+  board_.put(std::move(world), std::move(question), [this](const Obstacles& shared) { share_with_planner(shared); });
 }
 
 void Controller::Impl::share_with_planner(const Obstacles& obstacles) {
@@ -32,6 +33,7 @@ Controller::Controller(Arm arm, ControllerSettings settings, bool workers)
     : settings_(std::move(settings)),
       command_(arm.num_coordinates()),
       refused_(arm.num_coordinates()),
+      registry_(std::make_unique<SourceRegistry>(settings_)),
       impl_(std::make_unique<Impl>(arm, settings_, command_, workers)),
       newest_(impl_.get()),
       whole_(std::move(arm)),
@@ -67,9 +69,35 @@ void Controller::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd&
 void Controller::clear_goal() {
   tell([](Impl& impl) { impl.set_goal(std::nullopt); });
 }
-void Controller::set_obstacles(Obstacles obstacles) {
-  tell([&](Impl& impl) { impl.set_obstacles(obstacles); });
+
+double Controller::now() const noexcept {
+  return settings_.synchronous ? time_.load(std::memory_order_relaxed)
+                               : std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
+template <class Change>
+void Controller::change_sources(const Obstacles& said, Change&& change) {
+  const std::lock_guard lock(setters_);
+  change(*registry_);
+  const std::string question = newest().model.plausible.question(said);
+  const World world = registry_->world();
+  tell_locked([&](Impl& impl) { impl.put(world, question); });
+}
+void Controller::set_obstacles(Obstacles obstacles, const SourceOptions& options) {
+  change_sources(obstacles, [&](SourceRegistry& sources) { sources.set(obstacles, options, now()); });
+}
+void Controller::remove_obstacles(const std::string& source) {
+  change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.remove(source); });
+}
+void Controller::add_obstacle(const Obstacles& obstacle, const std::string& source) {
+  change_sources(obstacle, [&](SourceRegistry& sources) { sources.add(obstacle, source); });
+}
+void Controller::move_obstacle(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options) {
+  change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.move(name, pose, options, now()); });
+}
+void Controller::remove_obstacle(const std::string& name, const std::string& source) {
+  change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.remove(name, source); });
+}
+std::vector<SourceState> Controller::sources() const { return impl_->sources().states(); }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept { return step_with(q, v, nullptr, nullptr); }
 
@@ -89,6 +117,7 @@ const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const E
   }
   take_over();
   const Command& command = impl_->step(q, v, {mass_matrix, bias});
+  time_.store(impl_->time(), std::memory_order_relaxed);
   if (recorder != nullptr) {
     recorder->end_step(*impl_);
   }

@@ -38,11 +38,7 @@ std::string explain_activity(Activity activity, const InputsStage& inputs, const
                  : "stopped: the velocity is " +
                        age_in_words(inputs.request().age(), "inputs.timeout", settings.inputs.timeout) +
                        "; set_velocity or set_twist must be called more often";
-    case Activity::stale:
-      return sources.number() == 0
-                 ? "stopped: obstacle_timeout is set, but set_obstacles was never called; pass Obstacles.none() for a free workspace"
-                 : "stopped: the obstacles are " + age_in_words(sources.age(), "obstacle_timeout", settings.obstacle_timeout) +
-                       "; set_obstacles must be called more often";
+    case Activity::stale: return "stopped: " + sources.explain();
     case Activity::waiting: return "waiting for a posture that reaches the pose";
     case Activity::arrived: return "arrived";
     case Activity::blocked:
@@ -116,7 +112,7 @@ std::string Controller::Impl::explain_way() const {
   if (planner_status == OnlinePlannerStatus::start_in_collision) {
     return text + explain_start(model.arm.robot(), goal.planner()->last_plan().obstruction);
   }
-  const std::string at_target = explain_target(model, board_, inputs_, sources_.age());
+  const std::string at_target = explain_target(model, board_, inputs_, sources_);
   if (planner_status == OnlinePlannerStatus::goal_in_collision || goal.stops_short(state_.followed)) {
     return text + at_target;
   }

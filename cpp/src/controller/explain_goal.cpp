@@ -57,13 +57,13 @@ std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const 
     return std::nullopt;
   }
   Obstruction found;
-  const bool touches =
-      RrtConnect(body, of_endpoints()).obstructed(joints != nullptr ? joints->position : posture->q, *newest.obstacles, found);
+  const bool touches = RrtConnect(body, of_endpoints())
+                           .obstructed(joints != nullptr ? joints->position : posture->q, newest.world->obstacles, found);
   return touches ? std::optional(found) : std::nullopt;
 }
 
 std::string explain_target(const ControllerModel& model, const RequestBoard& board, const InputsStage& inputs,
-                           double obstacle_age) {
+                           const Sources& sources) {
   const GoalFollower& goal = inputs.goal();
   if (!goal.is_led_to_target() || inputs.request().moves()) {
     return {};
@@ -71,8 +71,8 @@ std::string explain_target(const ControllerModel& model, const RequestBoard& boa
   const Eigen::VectorXd& target = goal.target_position();
   const bool is_pose = inputs.request().pose_goal() != nullptr;
   const RequestBoard::Newest newest = board.newest();
-  Obstacles obstacles = *newest.obstacles;
-  obstacles.advance(obstacle_age);
+  Obstacles obstacles = newest.world->obstacles;
+  sources.motion().apply(obstacles);
   Obstruction obstruction;
   RrtConnect endpoint_checker(model.body, of_endpoints());
   if (newest.posture && newest.posture->touches_itself &&

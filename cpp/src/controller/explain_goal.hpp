@@ -5,6 +5,7 @@
 
 #include "attractor_stage.hpp"
 #include "inputs_stage.hpp"
+#include "sources.hpp"
 #include "measured_state.hpp"
 #include "model.hpp"
 #include "request_board.hpp"
@@ -18,7 +19,7 @@ namespace sidestep {
 std::optional<Obstruction> obstruction_at_goal(const RequestBoard& board, const ClearanceQuery& body);
 /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
 std::string explain_target(const ControllerModel& model, const RequestBoard& board, const InputsStage& inputs,
-                           double obstacle_age);
+                           const Sources& sources);
 /// What is in the way where the arm is, and what to do about it.
 std::string explain_start(const Robot& robot, const Obstruction& here);
 /// How far the nearest posture is from a pose that is out of reach; empty where none was found.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "activation_distances.hpp"
 #include "activity_judge.hpp"
@@ -39,7 +40,8 @@ class Controller::Impl {
   void set_velocity(const Eigen::VectorXd& v);
   void set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free);
   void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour);
-  void set_obstacles(Obstacles obstacles);
+  /// All obstacles; `question`: what is hard to believe in what was set.
+  void put(World world, std::string question = {});
   /// `question`: of a trajectory; that of other requests is found here.
   void put(Request request, std::string question = {});
   /// Obstacles that were set, for the planner's thread.
@@ -60,6 +62,8 @@ class Controller::Impl {
   std::string explain() const;
   Eigen::VectorXd target() const;
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
+  const Sources& sources() const noexcept { return sources_; }
+  double time() const noexcept { return state_.time; }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
   StepStatus attraction_status() const noexcept { return state_.attraction; }
   TorqueStatus program_status() const noexcept { return state_.program; }
@@ -173,6 +177,11 @@ class Controller::Impl {
 template <class Action>
 void Controller::tell(Action&& action) {
   const std::lock_guard lock(setters_);
+  tell_locked(std::forward<Action>(action));
+}
+
+template <class Action>
+void Controller::tell_locked(Action&& action) {
   // The one that takes over is told first: then it has no older request. The other one needs none after that.
   if (lifted_ != nullptr) {
     action(*lifted_);

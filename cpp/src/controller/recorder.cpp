@@ -28,6 +28,17 @@ recording::PoseRecord to_record(const PoseGoal& goal) {
           s.position_stiffness, s.orientation_stiffness, s.posture_stiffness, s.rest};
 }
 
+recording::ObstaclesRecord to_record(std::uint64_t number, const Obstacles& obstacles) {
+  recording::ObstaclesRecord record{
+      number, obstacles.points(), obstacles.velocities(), obstacles.radii(), obstacles.uncertainty(), {}, {}, {}};
+  record.order.assign(obstacles.tree().order().begin(), obstacles.tree().order().end());
+  for (const auto& [name, count] : obstacles.groups()) {
+    record.names.push_back(name);
+    record.counts.push_back(count);
+  }
+  return record;
+}
+
 recording::RequestRecord to_record(std::uint64_t number, const Request& request) {
   recording::RequestRecord record;
   record.number = number;
@@ -176,18 +187,19 @@ void Recorder::note(const Controller::Impl& newest) {
     return;
   }
   const RequestBoard& board = newest.board();
-  const auto [obstacle_number, obstacles] = board.newest_obstacles();
+  const std::shared_ptr<const World> world = board.newest_world();
   const std::uint64_t request_number = board.request_number();
-  if (obstacle_number > noted_obstacles_) {
-    noted_obstacles_ = obstacle_number;
-    recording::ObstaclesRecord record{
-        obstacle_number, obstacles->points(), obstacles->velocities(), obstacles->radii(), {}, {}, {}};
-    record.order.assign(obstacles->tree().order().begin(), obstacles->tree().order().end());
-    for (const auto& [name, count] : obstacles->groups()) {
-      record.names.push_back(name);
-      record.counts.push_back(count);
+  if (world->number > noted_world_) {
+    recording::WorldRecord record{world->number, {}};
+    for (const SourceSet& set : world->sources) {
+      if (set.number > noted_world_) {
+        add(recording::obstacles_tag, to_record(set.number, *set.points));
+      }
+      record.sources.push_back(
+          {set.name, set.id, set.number, set.heard_number, set.time, set.heard, set.valid_for, set.emptied, set.repeated});
     }
-    add(recording::obstacles_tag, record);
+    add(recording::world_tag, record);
+    noted_world_ = world->number;
   }
   if (request_number > noted_request_) {
     noted_request_ = request_number;

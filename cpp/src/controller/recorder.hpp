@@ -91,7 +91,7 @@ class Recorder {
 
   const std::filesystem::path path_;
   std::mutex& setters_;  // Guards what follows.
-  std::uint64_t noted_request_ = 0, noted_obstacles_ = 0;
+  std::uint64_t noted_request_ = 0, noted_world_ = 0;
   bool keeps_empty_ = true, closed_ = false;
   struct Requested {
     std::string_view tag;

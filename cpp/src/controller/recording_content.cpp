@@ -67,6 +67,7 @@ void each_part(Settings& s, Part&& part, Optional&& optional) {
   part("arrival.", s.arrival);
   part("tracking.", s.tracking);
   part("inputs.", s.inputs);
+  part("sources.", s.sources);
   if (optional("speed_limits", s.speed_limits)) {
     part("speed_limits.", *s.speed_limits);
   }

@@ -16,10 +16,10 @@
 namespace sidestep::recording {
 
 constexpr std::string_view magic{"\x89SSTEP\r\n", 8};  // not text; a transfer that changes line ends breaks it
-constexpr std::uint32_t format = 1;
+constexpr std::uint32_t format = 2;
 constexpr std::size_t tag_size = 4;
-constexpr std::string_view head_tag = "HEAD", request_tag = "REQU", obstacles_tag = "OBST", arm_tag = "ARMS", step_tag = "STEP",
-                           done_tag = "DONE";
+constexpr std::string_view head_tag = "HEAD", request_tag = "REQU", obstacles_tag = "OBST", world_tag = "WRLD",
+                           arm_tag = "ARMS", step_tag = "STEP", done_tag = "DONE";
 
 template <class T, class Record>
 concept Of = std::is_same_v<std::remove_const_t<T>, Record>;
@@ -57,17 +57,34 @@ void describe(auto& archive, Of<RequestRecord> auto& r) {
           r.steer, r.q, r.times);
 }
 
+/// The points of one set of a source.
 struct ObstaclesRecord {
   std::uint64_t number = 0;
   Eigen::Matrix3Xd points, velocities;
-  Eigen::VectorXd radii;
+  Eigen::VectorXd radii, uncertainty;
   std::vector<std::int32_t> order;  // see Obstacles::in_order
   std::vector<std::string> names;
   std::vector<std::int64_t> counts;
 };
 void describe(auto& archive, Of<ObstaclesRecord> auto& o) {
-  archive(o.number, o.points, o.velocities, o.radii, o.order, o.names, o.counts);
+  archive(o.number, o.points, o.velocities, o.radii, o.uncertainty, o.order, o.names, o.counts);
 }
+
+/// One of the sources of a world; its points are those of the set of that number.
+struct SourceRecord {
+  std::string name;
+  std::uint64_t id = 0, number = 0, heard_number = 0;
+  double time = 0.0, heard = 0.0, valid_for = 0.0;
+  bool emptied = false, repeated = false;
+};
+void describe(auto& archive, Of<SourceRecord> auto& s) {
+  archive(s.name, s.id, s.number, s.heard_number, s.time, s.heard, s.valid_for, s.emptied, s.repeated);
+}
+struct WorldRecord {
+  std::uint64_t number = 0;
+  std::vector<SourceRecord> sources;
+};
+void describe(auto& archive, Of<WorldRecord> auto& w) { archive(w.number, w.sources); }
 
 struct ArmRecord {
   std::uint64_t number = 0, lifted_number = 0;  // 0: none is lifted

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <system_error>
 #include <utility>
 
@@ -158,6 +159,17 @@ void note_differences(const ControllerSettings& recorded, const ControllerSettin
   }
 }
 
+Obstacles obstacles_of(const recording::ObstaclesRecord& record) {
+  if (record.points.cols() == 0) {
+    return Obstacles::none();
+  }
+  Obstacles made = Obstacles::in_order(record.points, record.radii, record.velocities, record.uncertainty,
+                                       {record.order.begin(), record.order.end()});
+  return record.names.size() == 1 && record.names.front().empty()
+             ? made
+             : made.named(record.names, {record.counts.begin(), record.counts.end()});
+}
+
 }  // namespace
 
 /// A controller without threads that takes the steps of a recording.
@@ -176,7 +188,11 @@ class Replay {
     } else if (tag == recording::obstacles_tag) {
       auto record = read_record<recording::ObstaclesRecord>(content);
       const std::uint64_t number = record.number;
-      obstacles_.insert_or_assign(number, std::move(record));
+      obstacles_.insert_or_assign(number, std::make_shared<const Obstacles>(obstacles_of(record)));
+    } else if (tag == recording::world_tag) {
+      auto record = read_record<recording::WorldRecord>(content);
+      const std::uint64_t number = record.number;
+      worlds_.insert_or_assign(number, std::move(record));
     } else if (tag == recording::arm_tag) {
       auto record = read_record<recording::ArmRecord>(content);
       const std::uint64_t number = record.number;
@@ -193,7 +209,7 @@ class Replay {
   using Impl = Controller::Impl;
 
   void give_request(std::uint64_t number);
-  void give_obstacles(std::uint64_t number);
+  void give_world(std::uint64_t number);
   void give_arm(std::uint64_t number);
   void give_taken(recording::Decoder& in);
   Request request_of(const recording::RequestRecord& record, const Impl& impl) const;
@@ -201,9 +217,10 @@ class Replay {
   std::vector<recording::FieldRecord> fields_;
   Controller controller_;
   std::map<std::uint64_t, recording::RequestRecord> requests_;
-  std::map<std::uint64_t, recording::ObstaclesRecord> obstacles_;
+  std::map<std::uint64_t, std::shared_ptr<const Obstacles>> obstacles_;
+  std::map<std::uint64_t, recording::WorldRecord> worlds_;
   std::map<std::uint64_t, recording::ArmRecord> arms_;
-  std::uint64_t step_ = 0, request_ = 0, obstacle_ = 0;
+  std::uint64_t step_ = 0, request_ = 0, world_ = 0;
 };
 
 std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content) {
@@ -223,7 +240,7 @@ std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content)
   }
   // In the order in which a step takes over: an arm with what was set before, then what was set since, then results of workers.
   give_request(request_before);
-  give_obstacles(obstacles_before);
+  give_world(obstacles_before);
   const Impl& now = *controller_.impl_;
   const Impl* const lifted = now.lifted.load();
   if (arm != now.arm_number && (lifted == nullptr || arm != lifted->arm_number)) {
@@ -231,7 +248,7 @@ std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content)
   }
   controller_.take_over();
   give_request(request);
-  give_obstacles(obstacles);
+  give_world(obstacles);
   give_taken(in);
   Impl& impl = *controller_.impl_;
   step_ = number;
@@ -264,28 +281,31 @@ void Replay::give_request(std::uint64_t number) {
   requests_.erase(requests_.begin(), found);  // the newest stays, for one that was taken twice
 }
 
-void Replay::give_obstacles(std::uint64_t number) {
-  if (number == 0 || number == obstacle_) {
+void Replay::give_world(std::uint64_t number) {
+  if (number == 0 || number == world_) {
     return;
   }
-  const auto found = obstacles_.find(number);
-  if (found == obstacles_.end()) {
+  const auto found = worlds_.find(number);
+  if (found == worlds_.end()) {
     throw std::invalid_argument("its obstacles " + std::to_string(number) + " are missing");
   }
-  obstacle_ = number;
-  const recording::ObstaclesRecord& record = found->second;
-  Obstacles made = Obstacles::none();
-  if (record.points.cols() > 0) {
-    made = Obstacles::in_order(record.points, record.radii, record.velocities, {record.order.begin(), record.order.end()});
-    if (record.names.size() != 1 || !record.names.front().empty()) {
-      made = made.named(record.names, {record.counts.begin(), record.counts.end()});
+  world_ = number;
+  World world;
+  world.number = number;
+  std::uint64_t oldest = number;
+  for (const recording::SourceRecord& record : found->second.sources) {
+    const auto points = obstacles_.find(record.number);
+    if (points == obstacles_.end()) {
+      throw std::invalid_argument("set " + std::to_string(record.number) + " of its source '" + record.name + "' is missing");
     }
+    world.sources.push_back({record.name, record.id, record.number, record.time, record.heard, record.heard_number,
+                             record.valid_for, record.emptied, record.repeated, points->second});
+    oldest = std::min(oldest, record.number);
   }
-  controller_.tell([&](Impl& impl) {
-    impl.board().number_next_obstacles(number);
-    impl.set_obstacles(made);
-  });
-  obstacles_.erase(obstacles_.begin(), found);
+  world.obstacles = join(world.sources);
+  controller_.tell([&](Impl& impl) { impl.put(world); });
+  worlds_.erase(worlds_.begin(), found);
+  obstacles_.erase(obstacles_.begin(), obstacles_.lower_bound(oldest));
 }
 
 void Replay::give_arm(std::uint64_t number) {

@@ -9,7 +9,6 @@
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/joint_trajectory.hpp"
 #include "sidestep/robot/robot.hpp"
-#include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
 
@@ -35,10 +34,6 @@ using Request = std::variant<std::monostate, Goal, VelocityRequest, TwistRequest
 struct NumberedRequest {
   std::uint64_t number = 0;
   Request request;
-};
-struct NumberedObstacles {
-  std::uint64_t number = 0;
-  Obstacles obstacles = Obstacles::none();
 };
 
 }  // namespace sidestep

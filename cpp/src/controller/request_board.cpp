@@ -7,9 +7,9 @@ namespace sidestep {
 
 RequestBoard::RequestBoard(Eigen::Index nv)
     : requests_(NumberedRequest{}),
-      obstacles_(NumberedObstacles{}),
+      worlds_(World{}),
       measured_(Eigen::VectorXd::Constant(nv, std::numeric_limits<double>::quiet_NaN())),
-      shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())) {}
+      shown_world_(std::make_shared<const World>()) {}
 
 void RequestBoard::put(Request request, std::string question) {
   const std::lock_guard lock(mutex_);
@@ -20,36 +20,30 @@ void RequestBoard::put(Request request, std::string question) {
   requests_.put({++request_count_, std::move(request)});
 }
 
-void RequestBoard::show_obstacles(std::shared_ptr<const Obstacles> copy, std::string question, Obstacles obstacles) {
-  shown_obstacles_ = std::move(copy);
+void RequestBoard::show_world(std::shared_ptr<const World> copy, std::string question, World world) {
+  shown_world_ = std::move(copy);
   questions_.order_is_newer = questions_.order_is_newer && question.empty();
   questions_.obstacles = std::move(question);
-  obstacles_.put({++obstacle_count_, std::move(obstacles)});
+  worlds_.put(std::move(world));
 }
 
 RequestBoard::Newest RequestBoard::newest() const {
   const std::lock_guard lock(mutex_);
-  return {request_, shown_obstacles_, posture_, questions_, request_count_, obstacle_count_};
+  return {request_, shown_world_, posture_, questions_, request_count_};
 }
 
 void RequestBoard::show(const Newest& newest) {
   request_ = newest.request;
-  shown_obstacles_ = newest.obstacles;
+  shown_world_ = newest.world;
   questions_ = newest.questions;
   request_count_ = newest.request_number;
-  obstacle_count_ = newest.obstacle_number;
   requests_.put({request_count_, newest.request});
-  obstacles_.put({obstacle_count_, *newest.obstacles});
+  worlds_.put(*newest.world);
 }
 
 void RequestBoard::number_next_request(std::uint64_t number) noexcept {
   const std::lock_guard lock(mutex_);
   request_count_ = number - 1;
-}
-
-void RequestBoard::number_next_obstacles(std::uint64_t number) noexcept {
-  const std::lock_guard lock(mutex_);
-  obstacle_count_ = number - 1;
 }
 
 void RequestBoard::show_posture(std::uint64_t request_number, const Posture& posture) {
@@ -72,9 +66,9 @@ std::uint64_t RequestBoard::request_number() const {
   return request_count_;
 }
 
-RequestBoard::NewestObstacles RequestBoard::newest_obstacles() const {
+std::shared_ptr<const World> RequestBoard::newest_world() const {
   const std::lock_guard lock(mutex_);
-  return {obstacle_count_, shown_obstacles_};
+  return shown_world_;
 }
 
 Request RequestBoard::request(std::uint64_t number) const {

@@ -13,6 +13,7 @@
 #include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/math/triple_buffer.hpp"
+#include "world.hpp"
 
 namespace sidestep {
 
@@ -24,19 +25,19 @@ class RequestBoard {
 
   /// Hands a request over to the step; `question`: what is hard to believe in it, empty where nothing is.
   void put(Request request, std::string question);
-  /// Hands obstacles over to the step. `share` gets a copy before any other obstacles can be put: the planner's.
+  /// Hands all obstacles over to the step. `share` gets a copy before any others can be put: the planner's.
   template <class Share>
-  void put(Obstacles obstacles, std::string question, Share&& share) {
-    auto copy = std::make_shared<const Obstacles>(obstacles);
+  void put(World world, std::string question, Share&& share) {
+    auto copy = std::make_shared<const World>(world);
     const std::lock_guard lock(mutex_);  // also of the planner's obstacles: the worker must not bring back older ones
-    share(*copy);
-    show_obstacles(std::move(copy), std::move(question), std::move(obstacles));
+    share(copy->obstacles);
+    show_world(std::move(copy), std::move(question), std::move(world));
   }
   /// Calls share() unless newer obstacles than these have been put: who gets those knows them already.
   template <class Share>
-  void share_if_newest(std::uint64_t obstacle_number, Share&& share) {
+  void share_if_newest(std::uint64_t world_number, Share&& share) {
     const std::lock_guard lock(mutex_);
-    if (obstacle_count_ == obstacle_number) {
+    if (shown_world_->number == world_number) {
       share();
     }
   }
@@ -45,12 +46,11 @@ class RequestBoard {
   void take_over(const RequestBoard& before, Share&& share) {
     const Newest newest = before.newest();
     const std::lock_guard lock(mutex_);
-    share(*newest.obstacles);
+    share(newest.world->obstacles);
     show(newest);
   }
-  /// The next request put, or the next obstacles, have this number: that of a recording.
+  /// The next request put has this number: that of a recording.
   void number_next_request(std::uint64_t number) noexcept;
-  void number_next_obstacles(std::uint64_t number) noexcept;
 
   /// The posture that was found for the request of that number.
   void show_posture(std::uint64_t request_number, const Posture& posture);
@@ -69,26 +69,23 @@ class RequestBoard {
   /// All that was set last and found for it, as it belongs together.
   struct Newest {
     Request request;
-    std::shared_ptr<const Obstacles> obstacles;
+    std::shared_ptr<const World> world;
     std::optional<Posture> posture;
     Questions questions;
-    std::uint64_t request_number = 0, obstacle_number = 0;
+    std::uint64_t request_number = 0;
   };
   Newest newest() const;
   std::uint64_t request_number() const;
   /// The request of that number; none where there is a newer one.
   Request request(std::uint64_t number) const;
-  struct NewestObstacles {
-    std::uint64_t number = 0;
-    std::shared_ptr<const Obstacles> obstacles;
-  };
-  NewestObstacles newest_obstacles() const;
+  /// The obstacles that were set last, as they were given.
+  std::shared_ptr<const World> newest_world() const;
   Questions questions() const;
   /// What the background work failed with; empty: nothing.
   std::string fault() const;
 
   TripleBuffer<NumberedRequest>& requests() noexcept { return requests_; }
-  TripleBuffer<NumberedObstacles>& obstacles() noexcept { return obstacles_; }
+  TripleBuffer<World>& worlds() noexcept { return worlds_; }
   /// For the step: where the arm is measured (nv). No allocation.
   void show_measured(const Eigen::VectorXd& q) noexcept {
     measured_.draft() = q;
@@ -103,16 +100,16 @@ class RequestBoard {
  private:
   // With the mutex locked.
   void show(const Newest& newest);
-  void show_obstacles(std::shared_ptr<const Obstacles> copy, std::string question, Obstacles obstacles);
+  void show_world(std::shared_ptr<const World> copy, std::string question, World world);
   void note_fault(const char* what) noexcept;
 
   TripleBuffer<NumberedRequest> requests_;
-  TripleBuffer<NumberedObstacles> obstacles_;
+  TripleBuffer<World> worlds_;
   TripleBuffer<Eigen::VectorXd> measured_;  // NaN before the first step
   mutable std::mutex mutex_;                // Guards what follows.
   Request request_;
-  std::uint64_t request_count_ = 0, obstacle_count_ = 0;
-  std::shared_ptr<const Obstacles> shown_obstacles_;
+  std::uint64_t request_count_ = 0;
+  std::shared_ptr<const World> shown_world_;
   std::optional<Posture> posture_;
   Questions questions_;
   std::array<char, 160> fault_{};

@@ -102,6 +102,22 @@ const std::vector<Field<InputSettings>>& fields() {
 }
 
 template <>
+const std::vector<Field<SourceSettings>>& fields() {
+  using S = SourceSettings;
+  static const std::vector<Field<S>> all{
+      {"valid_for", &S::valid_for, "s", 0.01, none,
+       "age up to which a source of obstacles is believed that was given a time, has velocities or comes again and again: beyond it the arm stops "
+       "until the source comes again; shorter is safer, longer tolerates more lost sets"},
+      {"largest_speed", &S::largest_speed, "m/s", 0.0, 100.0,
+       "largest speed of obstacles that nobody has told of: larger keeps the arm farther from what is overdue or uncertain"},
+      {"empty_after", &S::empty_after, "s", 0.0, none,
+       "time for which a source that had obstacles must stay empty before that is believed: longer survives a camera that "
+       "sees nothing for longer; remove_obstacles is believed at once"},
+  };
+  return all;
+}
+
+template <>
 const std::vector<Field<ControllerSettings>>& fields() {
   using S = ControllerSettings;
   static const std::vector<Field<S>> all{
@@ -125,7 +141,8 @@ const std::vector<Field<ControllerSettings>>& fields() {
        "largest velocity that a clearance may demand, as a multiple of the velocity limit"},
       {"acceleration_overrun", &S::acceleration_overrun, "-", 1.0, 100.0,
        "largest acceleration that a clearance may demand, as a multiple of the acceleration limit"},
-      {"obstacle_timeout", &S::obstacle_timeout, "s", 0.001, none, "age above which obstacles are stale and the arm stops"},
+      {"obstacle_timeout", &S::obstacle_timeout, "s", 0.001, none,
+       "age above which every source of obstacles without a valid_for of its own is stale and the arm stops"},
       {"local_activation", &S::local_activation, "-", 0.0, 1.0,
        "shorter activation distances near the goal and in narrow places, among static obstacles; without it the arm "
        "creeps there"},
@@ -143,6 +160,7 @@ void ControllerSettings::validate() const {
   check_fields("controller: arrival.", arrival);
   check_fields("controller: tracking.", tracking);
   check_fields("controller: inputs.", inputs);
+  check_fields("controller: sources.", sources);
   if (!(barriers.floor < barriers.activation && barriers.floor < barriers.self_activation)) {
     throw std::invalid_argument("controller: barriers.floor is " + std::to_string(barriers.floor) +
                                 " m, allowed: below barriers.activation and barriers.self_activation");

@@ -68,7 +68,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
 }
 
 void Controller::Impl::take_over(double time) noexcept {
-  if (sources_.update(measured_.position(), time)) {
+  if (sources_.update(measured_.position(), {time, model.settings.period, 0.0})) {
     guard_.invalidate();
   }
   if (inputs_.update()) {
@@ -311,8 +311,8 @@ void Controller::Impl::tell_worker(const Goal& followed, double time, bool wakes
   s.v = reference_.v;
   s.request_number = request.number();
   s.posture_attempt = goal.attempt();
-  s.obstacle_number = sources_.handed_over();
-  s.obstacle_age = sources_.age();
+  s.world_number = sources_.handed_over();
+  s.motion = sources_.motion();
   s.by_pose = &followed == &inputs_.destination();
   s.trajectory.is = inputs_.input().is_followed() && request.trajectory() != nullptr;
   if (s.trajectory.is) {

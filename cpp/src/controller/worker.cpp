@@ -54,19 +54,28 @@ void Worker::run(GoalFollower& goal, LookAheadFollower& look_ahead) {
 }
 
 Obstacles Worker::obstacles_at(const Snapshot& snapshot) const {
-  const RequestBoard::NewestObstacles newest = board_.newest_obstacles();
-  Obstacles now = *newest.obstacles;
-  if (newest.number == snapshot.obstacle_number) {
-    now.advance(snapshot.obstacle_age);
+  const std::shared_ptr<const World> newest = board_.newest_world();
+  Obstacles now = newest->obstacles;
+  if (newest->number == snapshot.world_number) {
+    snapshot.motion.apply(now);
   }
   return now;
+}
+
+void Worker::share_with(OnlinePlanner& planner, const Snapshot& s, const Obstacles& obstacles) {
+  const bool moved = shared_world_ == s.world_number ? s.motion != shared_motion_ : s.motion != WorldMotion();
+  if (moved) {
+    board_.share_if_newest(s.world_number, [&] { planner.set_obstacles(obstacles); });
+  }
+  shared_world_ = s.world_number;
+  shared_motion_ = s.motion;
 }
 
 void Worker::look(const Snapshot& s, GoalFollower& goal, LookAheadFollower& look_ahead) {
   Request request = board_.request(s.request_number);
   const Obstacles obstacles = obstacles_at(s);
-  if (goal.has_planner() && obstacles.tree().moves()) {
-    board_.share_if_newest(s.obstacle_number, [&] { goal.planner()->set_obstacles(obstacles); });
+  if (goal.has_planner()) {
+    share_with(*goal.planner(), s, obstacles);
   }
   if (const auto* set = std::get_if<Goal>(&request)) {
     if (const auto* pose = std::get_if<PoseGoal>(set); pose != nullptr && !is_moving(*pose)) {

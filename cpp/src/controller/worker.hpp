@@ -23,8 +23,8 @@ struct Snapshot {
   double time = 0.0;
   Eigen::VectorXd q, v;  // State of the reference.
   std::uint64_t request_number = 0, posture_attempt = 0;
-  std::uint64_t obstacle_number = 0;
-  double obstacle_age = 0.0;
+  std::uint64_t world_number = 0;
+  WorldMotion motion;        // How its obstacles have moved since they were given.
   JointGoal followed;        // Goal by which the reference is led.
   bool by_pose = false;      // the pose goal itself is followed, as it moves
   double request_age = 0.0;  // time for which it has moved [s]
@@ -69,6 +69,8 @@ class Worker {
   void look_for_posture(const Snapshot& snapshot, const PoseGoal& pose, const Obstacles& obstacles, GoalFollower& goal);
   void look_ahead_from(const Snapshot& snapshot, Request& request, const Obstacles& obstacles, const GoalFollower& goal,
                        LookAheadFollower& look_ahead);
+  /// The planner gets obstacles that have moved since it got them.
+  void share_with(OnlinePlanner& planner, const Snapshot& snapshot, const Obstacles& obstacles);
   /// The newest obstacles, where those of the snapshot have moved to.
   Obstacles obstacles_at(const Snapshot& snapshot) const;
 
@@ -79,6 +81,8 @@ class Worker {
   GeometricSystem::Workspace workspace_;
   TripleBuffer<Snapshot> snapshots_;
   TripleBuffer<FoundActivations> activations_;
+  std::uint64_t shared_world_ = 0;  // Number of the obstacles that the planner has, as they are where nothing moves.
+  WorldMotion shared_motion_;       // their motion then
   std::uint64_t sought_request_ = 0, sought_attempt_ = 0;
   double next_trajectory_ = 0.0;  // [s]
   std::counting_semaphore<> wake_{0};

@@ -11,7 +11,11 @@
 
 namespace sidestep {
 Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities)
-    : points_(std::move(points)), radii_(std::move(radii)), velocities_(std::move(velocities)) {
+    : points_(std::move(points)),
+      radii_(std::move(radii)),
+      velocities_(std::move(velocities)),
+      uncertainty_(Eigen::VectorXd::Zero(points_.cols())),
+      begins_{0, points_.cols()} {
   const Eigen::Index num = points_.cols();
   if (num == 0) {
     throw std::invalid_argument(
@@ -45,8 +49,9 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
 }
 
 Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
-                              std::vector<int> order) {
+                              Eigen::VectorXd uncertainty, std::vector<int> order) {
   Obstacles made(std::move(points), std::move(radii), std::move(velocities));
+  made = made.moving(made.velocities_, std::move(uncertainty));
   std::vector<int> sorted = order;
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t n = 0; n < sorted.size(); ++n) {
@@ -60,8 +65,80 @@ Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Ei
   return made;
 }
 
-Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const {
-  if (names.size() != counts.size()) {
+Obstacles Obstacles::join(const std::vector<const Obstacles*>& sets) {
+  Obstacles joined;
+  joined.begins_ = {0};
+  std::vector<const PointTree*> trees;
+  auto names = std::make_shared<Names>();
+  for (const Obstacles* const set : sets) {
+    const Eigen::Index before = joined.begins_.back();
+    for (std::size_t k = 1; k < set->begins_.size(); ++k) {
+      joined.begins_.push_back(before + set->begins_[k]);
+    }
+    trees.push_back(&set->tree_);
+    for (std::size_t k = 0; const auto& [name, count] : set->groups()) {
+      names->poses.push_back(set->pose_of(k++));
+      names->names.push_back(name);
+      names->ends.push_back((names->ends.empty() ? 0 : names->ends.back()) + count);
+    }
+  }
+  const Eigen::Index num = joined.begins_.back();
+  joined.points_.resize(3, num);
+  joined.velocities_.resize(3, num);
+  joined.radii_.resize(num);
+  joined.uncertainty_.resize(num);
+  Eigen::Index at = 0;
+  for (const Obstacles* const set : sets) {
+    const Eigen::Index count = set->size();
+    joined.points_.middleCols(at, count) = set->points_;
+    joined.velocities_.middleCols(at, count) = set->velocities_;
+    joined.radii_.segment(at, count) = set->radii_;
+    joined.uncertainty_.segment(at, count) = set->uncertainty_;
+    at += count;
+  }
+  joined.tree_ = PointTree::join(trees);
+  joined.names_ = std::move(names);
+  return joined;
+}
+
+Obstacles Obstacles::moving(Eigen::Matrix3Xd velocities, Eigen::VectorXd uncertainty) const {
+  if (velocities.cols() != size() || uncertainty.size() != size() || !velocities.allFinite() || !uncertainty.allFinite() ||
+      (uncertainty.array() < 0.0).any()) {
+    throw std::invalid_argument("obstacles: " + std::to_string(velocities.cols()) + " velocities and " +
+                                std::to_string(uncertainty.size()) + " uncertainties of " + std::to_string(size()) +
+                                " points; there must be one of each, finite, no uncertainty below 0");
+  }
+  Obstacles copy = *this;
+  if (velocities != velocities_ || uncertainty != uncertainty_) {
+    copy.velocities_ = std::move(velocities);
+    copy.uncertainty_ = std::move(uncertainty);
+    copy.tree_ = PointTree(copy.points_, copy.radii_, copy.velocities_, tree_.order());
+    copy.version_ = next_version();
+  }
+  return copy;
+}
+
+Obstacles Obstacles::frozen() const {
+  Obstacles copy = *this;
+  for (std::size_t part = 0; part < num_parts(); ++part) {
+    copy.freeze(part);
+  }
+  return copy;
+}
+
+std::size_t Obstacles::part_of(Eigen::Index point) const noexcept {
+  const auto end = std::upper_bound(begins_.begin() + 1, begins_.end() - 1, point);
+  return static_cast<std::size_t>(end - begins_.begin()) - 1;
+}
+
+Eigen::Isometry3d Obstacles::pose_of(std::size_t k) const {
+  return names_ && k < names_->poses.size() ? names_->poses[k] : Eigen::Isometry3d::Identity();
+}
+
+Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts,
+                           std::vector<Eigen::Isometry3d> poses) const {
+  poses.resize(poses.empty() ? names.size() : poses.size(), Eigen::Isometry3d::Identity());
+  if (names.size() != counts.size() || poses.size() != names.size()) {
     throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " + std::to_string(counts.size()) +
                                 " counts; the numbers must be equal");
   }
@@ -81,7 +158,7 @@ Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eig
                                 std::to_string(size()));
   }
   Obstacles copy = *this;
-  copy.names_ = std::make_shared<const Names>(Names{std::move(names), std::move(ends)});
+  copy.names_ = std::make_shared<const Names>(Names{std::move(names), std::move(ends), std::move(poses)});
   return copy;
 }
 
@@ -110,19 +187,49 @@ std::string_view Obstacles::name_of(Eigen::Index point) const noexcept {
 }
 
 bool Obstacles::advance(double duration) noexcept {
+  bool all = true;
+  for (std::size_t part = 0; part < num_parts(); ++part) {
+    all = advance(part, duration) && all;
+  }
+  return all;
+}
+
+bool Obstacles::advance(std::size_t part, double duration) noexcept {
   if (!std::isfinite(duration)) {
     return false;
   }
-  if (!tree_.moves()) {
+  if (!moves(part)) {
     return true;
   }
-  if (!all_finite(points_ + duration * velocities_)) {
+  const Eigen::Index begin = begins_[part], count = begins_[part + 1] - begin;
+  auto points = points_.middleCols(begin, count);
+  const auto velocities = velocities_.middleCols(begin, count);
+  if (!all_finite(points + duration * velocities)) {
     return false;
   }
-  points_ += duration * velocities_;
-  tree_.advance(duration);
+  points += duration * velocities;
+  tree_.advance(part, duration);
   version_ = next_version();
   return true;
+}
+
+void Obstacles::freeze(std::size_t part) noexcept {
+  const Eigen::Index begin = begins_[part], count = begins_[part + 1] - begin;
+  if (count > 0) {
+    velocities_.middleCols(begin, count).setZero();
+    uncertainty_.segment(begin, count).setZero();
+    tree_.freeze(part);
+  }
+}
+
+void Obstacles::hide(std::size_t part) noexcept {
+  freeze(part);
+  const Eigen::Index begin = begins_[part], count = begins_[part + 1] - begin;
+  if (count > 0) {
+    points_.middleCols(begin, count).setConstant(PointTree::padding);
+    tree_.hide(part);
+    version_ = next_version();
+  }
 }
 
 std::string Obstacles::words_for(Eigen::Index point) const {

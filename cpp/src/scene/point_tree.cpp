@@ -86,25 +86,69 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
                      std::vector<int> order)
-    : order_(std::move(order)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
+    : num_points_(static_cast<int>(order.size())),
+      order_(std::move(order)),
+      fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
   if (order_.empty()) {
     return;
   }
   common_radius_ = (radii.array() == radii[0]).all() ? radii[0] : -1.0;
   const std::size_t leaves = groups(order_.size(), leaf_size);
-  for (int c = 0; c < 7; ++c) {
-    columns_[static_cast<std::size_t>(c)].assign(leaves * leaf_size, c < 3 ? padding : 0.0);
+  for (std::size_t c = 0; c < num_columns; ++c) {
+    columns_[c].assign(leaves * leaf_size, c < 3 ? padding : 0.0);
     for (std::size_t n = 0; n < order_.size(); ++n) {
-      columns_[static_cast<std::size_t>(c)][n] = c < 3    ? points(c, order_[n])
-                                                 : c == 3 ? radii[order_[n]]
-                                                          : velocities(c - 4, order_[n]);
+      const auto axis = static_cast<Eigen::Index>(c);
+      columns_[c][n] = c < 3 ? points(axis, order_[n]) : c == 3 ? radii[order_[n]] : velocities(axis - 4, order_[n]);
     }
   }
-  levels_.emplace_back(static_cast<int>(leaves));
+  counts_.assign(leaves, leaf_size);
+  counts_.back() = static_cast<int>(order_.size()) - static_cast<int>(leaves - 1) * leaf_size;
+  parts_ = {{0, static_cast<int>(leaves), fastest_}};
+  build(leaves);
+}
+
+PointTree PointTree::join(const std::vector<const PointTree*>& trees) {
+  PointTree joined;
+  int num_points = 0;
+  for (const PointTree* const tree : trees) {
+    const std::size_t begin = joined.counts_.size();
+    for (std::size_t k = 0; k < tree->parts_.size(); ++k) {
+      joined.parts_.push_back(tree->parts_[k]);
+      joined.parts_.back().first_leaf += static_cast<int>(begin);
+    }
+    if (tree->parts_.empty()) {
+      joined.parts_.emplace_back(Part{static_cast<int>(begin), 0});
+      continue;
+    }
+    const std::size_t leaves = groups(begin + tree->counts_.size(), fan_out) * fan_out;
+    joined.counts_.insert(joined.counts_.end(), tree->counts_.begin(), tree->counts_.end());
+    joined.counts_.resize(leaves, 0);
+    joined.order_.reserve(leaves * leaf_size);
+    for (const int n : tree->order_) {
+      joined.order_.push_back(n < 0 ? n : n + num_points);
+    }
+    joined.order_.resize(leaves * leaf_size, -1);
+    for (std::size_t c = 0; c < num_columns; ++c) {
+      joined.columns_[c].insert(joined.columns_[c].end(), tree->columns_[c].begin(), tree->columns_[c].end());
+      joined.columns_[c].resize(leaves * leaf_size, c < 3 ? padding : 0.0);
+    }
+    joined.common_radius_ = begin == 0 || joined.common_radius_ == tree->common_radius_ ? tree->common_radius_ : -1.0;
+    num_points += tree->num_points_;
+  }
+  joined.num_points_ = num_points;
+  if (!joined.counts_.empty()) {
+    joined.build(joined.counts_.size());
+  }
+  joined.find_fastest();
+  return joined;
+}
+
+void PointTree::build(std::size_t num_leaves) {
+  levels_.emplace_back(static_cast<int>(num_leaves));
   while (levels_.back().size > 1) {
     levels_.emplace_back(static_cast<int>(groups(static_cast<std::size_t>(levels_.back().size), fan_out)));
   }
-  refit();
+  refit({0, static_cast<int>(num_leaves)});
 }
 
 PointTree::Level::Level(int count) : size(count) {
@@ -117,11 +161,14 @@ PointTree::Level::Level(int count) : size(count) {
   radius.assign(padded, 0.0);
 }
 
-void PointTree::refit() noexcept {
+void PointTree::refit(const Part& part) noexcept {
+  int first = part.first_leaf, end = part.first_leaf + part.num_leaves;
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    for (int node = 0; node < levels_[level].size; ++node) {
+    for (int node = first; node < end; ++node) {
       fit(level, node);
     }
+    first /= fan_out;
+    end = (end + fan_out - 1) / fan_out;
   }
 }
 
@@ -132,20 +179,30 @@ void PointTree::fit(std::size_t level, int node) noexcept {
   const auto n = static_cast<std::size_t>(node);
   const std::size_t per_node = leaf ? leaf_size : fan_out;
   const std::size_t begin = n * per_node;
-  const std::size_t end = std::min(begin + per_node, leaf ? order_.size() : static_cast<std::size_t>(below.size));
+  const std::size_t end =
+      leaf ? begin + static_cast<std::size_t>(counts_[n]) : std::min(begin + per_node, static_cast<std::size_t>(below.size));
+  const auto is_empty = [&](std::size_t i) { return !leaf && below.centre[0][i] == padding; };
+  at.radius[n] = at.largest[n] = 0.0;
+  bool any = false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<double>& x = leaf ? columns_[axis] : below.centre[axis];
     double low = infinity, high = -infinity;
     for (std::size_t i = begin; i < end; ++i) {
+      if (is_empty(i)) {
+        continue;
+      }
       const double half = leaf ? 0.0 : below.half[axis][i];
       low = std::min(low, x[i] - half);
       high = std::max(high, x[i] + half);
+      any = true;
     }
-    at.centre[axis][n] = 0.5 * (low + high);
-    at.half[axis][n] = 0.5 * (high - low);
+    at.centre[axis][n] = any ? 0.5 * (low + high) : padding;
+    at.half[axis][n] = any ? 0.5 * (high - low) : 0.0;
   }
-  at.radius[n] = at.largest[n] = 0.0;
   for (std::size_t i = begin; i < end; ++i) {
+    if (is_empty(i)) {
+      continue;
+    }
     const Ball member =
         leaf ? Ball{columns_[0][i], columns_[1][i], columns_[2][i], columns_[3][i]} : below.ball(static_cast<int>(i));
     const Eigen::Vector3d away(member.x - at.centre[0][n], member.y - at.centre[1][n], member.z - at.centre[2][n]);
@@ -154,22 +211,49 @@ void PointTree::fit(std::size_t level, int node) noexcept {
   }
 }
 
-void PointTree::advance(double duration) noexcept {
-  if (!moves()) {
+void PointTree::advance(std::size_t part, double duration) noexcept {
+  const Part& moved = parts_[part];
+  if (!(moved.fastest > 0.0)) {
     return;
   }
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (std::size_t n = 0; n < order_.size(); ++n) {
-      columns_[axis][n] += duration * columns_[4 + axis][n];
+  const auto begin = static_cast<std::size_t>(moved.first_leaf) * leaf_size;
+  for (std::size_t leaf = 0; leaf < static_cast<std::size_t>(moved.num_leaves); ++leaf) {
+    const std::size_t first = begin + leaf * leaf_size;
+    const std::size_t end = first + static_cast<std::size_t>(count(moved.first_leaf + static_cast<int>(leaf)));
+    for (std::size_t n = first; n < end; ++n) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        columns_[axis][n] += duration * columns_[4 + axis][n];
+      }
     }
   }
-  refit();
+  refit(moved);
 }
 
-void PointTree::freeze() noexcept {
+void PointTree::freeze(std::size_t part) noexcept {
+  Part& frozen = parts_[part];
+  frozen.fastest = 0.0;
+  for (std::size_t c = 4; c < num_columns; ++c) {
+    const auto begin = columns_[c].begin() + std::ptrdiff_t{frozen.first_leaf} * leaf_size;
+    std::fill_n(begin, std::ptrdiff_t{frozen.num_leaves} * leaf_size, 0.0);
+  }
+  find_fastest();
+}
+
+void PointTree::hide(std::size_t part) noexcept {
+  freeze(part);
+  const Part& hidden = parts_[part];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto begin = columns_[axis].begin() + std::ptrdiff_t{hidden.first_leaf} * leaf_size;
+    std::fill_n(begin, std::ptrdiff_t{hidden.num_leaves} * leaf_size, padding);
+  }
+  std::fill_n(counts_.begin() + hidden.first_leaf, hidden.num_leaves, 0);
+  refit(hidden);
+}
+
+void PointTree::find_fastest() noexcept {
   fastest_ = 0.0;
-  for (std::size_t axis = 4; axis < 7; ++axis) {
-    std::fill(columns_[axis].begin(), columns_[axis].end(), 0.0);
+  for (const Part& part : parts_) {
+    fastest_ = std::max(fastest_, part.fastest);
   }
 }
 

@@ -57,6 +57,7 @@ BOOST_AUTO_TEST_CASE(a_change_of_body_makes_no_step_in_acceleration) {
   const JointLimits limits = test::arm_limits(nv);
   for (const auto output : {ControllerSettings::Output::torque, ControllerSettings::Output::acceleration}) {
     Controller controller(covered_arm(limits), synchronous(output));
+    controller.set_obstacles(Obstacles::none());
     controller.set_goal(Eigen::VectorXd::Constant(nv, 0.4));
     Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, -0.3), v = Eigen::VectorXd::Zero(nv), before = v;
     double fastest = 0.0, jump = 0.0;
@@ -85,6 +86,7 @@ BOOST_AUTO_TEST_CASE(a_change_of_body_makes_no_step_in_acceleration) {
 BOOST_AUTO_TEST_CASE(what_is_attached_weighs_and_keeps_off) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, synchronous(ControllerSettings::Output::torque));
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   const auto at_rest = [&] {
     for (int k = 0; k < 2000; ++k) {
@@ -135,6 +137,7 @@ BOOST_AUTO_TEST_CASE(links_that_overlap_it_when_it_is_taken_may_stay_as_near_as_
     BOOST_TEST(pair.contact == 0.0);  // nobody says where the arm was
   }
   Controller controller(arm, synchronous(ControllerSettings::Output::acceleration));
+  controller.set_obstacles(Obstacles::none());
   controller.step(q, Eigen::VectorXd::Zero(nv));
   controller.attach(object);
   controller.step(q, Eigen::VectorXd::Zero(nv));
@@ -150,6 +153,7 @@ BOOST_AUTO_TEST_CASE(steps_allocate_nothing_while_another_thread_attaches_and_de
   settings.planner->search.shortcuts = 20;
   settings.look_ahead->tries = 30;
   Controller controller(covered_arm(test::arm_limits(nv)), settings);
+  controller.set_obstacles(Obstacles::none());
   controller.set_goal(Eigen::VectorXd::Constant(nv, -0.3));
   std::atomic<bool> done{false};
   std::thread other([&] {
@@ -178,11 +182,12 @@ BOOST_AUTO_TEST_CASE(orders_go_on_where_they_were) {
   const JointLimits limits = test::arm_limits(nv);
   const auto end_of = [&](bool changes) {
     Controller controller(covered_arm(limits), synchronous(ControllerSettings::Output::acceleration));
+    controller.set_obstacles(Obstacles::none());
     Eigen::MatrixXd path(nv, 3);
     path << Eigen::VectorXd::Constant(nv, -0.2), Eigen::VectorXd::Constant(nv, 0.1), Eigen::VectorXd::Constant(nv, 0.3);
     Eigen::VectorXd q = path.col(0), v = Eigen::VectorXd::Zero(nv);
     controller.set_trajectory(path, Eigen::Vector3d(0.0, 1.0, 2.0));
-    controller.set_obstacles(test::ball({3.0, 0.0, 0.0}, 0.1, {0.1, 0.0, 0.0}));
+    controller.set_obstacles(test::ball({3.0, 0.0, 0.0}, 0.1, {0.1, 0.0, 0.0}), test::for_ever);
     for (int k = 0; k < 1500; ++k) {
       if (changes && k == 700) {
         controller.attach(bar());
@@ -198,6 +203,7 @@ BOOST_AUTO_TEST_CASE(orders_go_on_where_they_were) {
 BOOST_AUTO_TEST_CASE(what_is_wrong_is_named_and_nothing_changes) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, synchronous(ControllerSettings::Output::acceleration));
+  controller.set_obstacles(Obstacles::none());
   const auto refusal = [&](const std::function<void(Attachment&)>& spoil) {
     Attachment object = bar();
     spoil(object);
@@ -223,6 +229,7 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_is_named_and_nothing_changes) {
 
 BOOST_AUTO_TEST_CASE(the_command_is_the_same_object_through_every_change) {
   Controller controller(covered_arm(test::arm_limits(nv)), synchronous(ControllerSettings::Output::acceleration));
+  controller.set_obstacles(Obstacles::none());
   const Command& command = controller.command();
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   for (int k = 0; k < 5; ++k) {
@@ -239,6 +246,7 @@ BOOST_AUTO_TEST_CASE(a_load_that_is_told_late_is_not_counted_twice) {
   const RigidBodyDynamics dynamics = loaded.dynamics();
   RigidBodyDynamics::Workspace w(dynamics);
   Controller controller(bare, synchronous(ControllerSettings::Output::torque));
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv), bias(nv);
   Eigen::MatrixXd mass(nv, nv);
   double moved = 0.0;
@@ -262,6 +270,7 @@ BOOST_AUTO_TEST_CASE(a_load_that_is_told_late_is_not_counted_twice) {
 
 BOOST_AUTO_TEST_CASE(an_object_that_others_name_can_be_let_go) {
   Controller controller(covered_arm(test::arm_limits(nv)), synchronous(ControllerSettings::Output::acceleration));
+  controller.set_obstacles(Obstacles::none());
   controller.attach(bar());
   Attachment lid = bar("lid");
   lid.may_touch = {"bar"};
@@ -280,6 +289,7 @@ BOOST_AUTO_TEST_CASE(what_stands_on_something_may_until_it_is_lifted) {
     ControllerSettings settings = synchronous(ControllerSettings::Output::acceleration);
     settings.synchronous = one_thread;
     Controller controller(arm, settings);
+    controller.set_obstacles(Obstacles::none());
     Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
     const Eigen::VectorXd start = q;
     Attachment object = bar();

@@ -61,6 +61,7 @@ Eigen::VectorXd constant(double value) { return Eigen::VectorXd::Constant(num_jo
 BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_everything_on_and_orders_from_another_thread) {
   const Arm arm = make_arm();
   Controller controller(arm);
+  controller.set_obstacles(Obstacles::none());
   BOOST_TEST(controller.has_torque());
   Eigen::VectorXd q = constant(0.1), v = constant(0.0);
   std::size_t count = 0;
@@ -77,7 +78,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_everything_on_and_orders_from
         } else {
           controller.set_goal(constant(0.8 * side));
         }
-        controller.set_obstacles(ball({0.5, -0.6 * side, 0.9}, {0.0, 0.4 * side, 0.0}));
+        controller.set_obstacles(ball({0.5, -0.6 * side, 0.9}, {0.0, 0.4 * side, 0.0}), test::for_ever);
       })
           .join();
     }
@@ -102,8 +103,9 @@ BOOST_AUTO_TEST_CASE(a_synchronous_motion_repeats_bit_for_bit) {
   Eigen::MatrixXd first;
   for (int run = 0; run < 2; ++run) {
     Controller controller(arm, synchronous());
+    controller.set_obstacles(Obstacles::none());
     controller.set_goal(constant(0.9));
-    controller.set_obstacles(ball({0.6, 0.3, 0.9}, {-0.1, 0.0, 0.0}));
+    controller.set_obstacles(ball({0.6, 0.3, 0.9}, {-0.1, 0.0, 0.0}), test::for_ever);
     const MotionRecord record = integrate(controller, constant(-0.4), constant(0.0), 1500);
     if (run == 0) {
       first = record.q;
@@ -118,6 +120,7 @@ BOOST_AUTO_TEST_CASE(clearances_bound_commands_whatever_the_goal_is) {
   const Eigen::VectorXd q = constant(0.0), v = constant(0.3);
   for (const int kind : {0, 1, 2}) {
     Controller controller(arm, synchronous());
+    controller.set_obstacles(Obstacles::none());
     controller.set_obstacles(ball({0.17, 0.0, 1.5}));  // less than 5 cm beside the upright arm
     if (kind == 1) {
       controller.set_goal(constant(1.0));
@@ -136,6 +139,7 @@ BOOST_AUTO_TEST_CASE(stale_obstacles_stop_the_arm_and_keep_their_clearances) {
   ControllerSettings settings = synchronous();
   settings.obstacle_timeout = 0.05;
   Controller controller(make_arm(), settings);
+  controller.set_obstacles(Obstacles::none());
   controller.set_goal(constant(1.0));
   controller.set_obstacles(ball({0.17, 0.0, 1.5}));
   Eigen::VectorXd q = constant(0.0), v = constant(0.0);
@@ -152,6 +156,7 @@ BOOST_AUTO_TEST_CASE(stale_obstacles_stop_the_arm_and_keep_their_clearances) {
 
 BOOST_AUTO_TEST_CASE(bad_input_throws_or_stops_and_nothing_is_lost) {
   Controller controller(make_arm(), synchronous());
+  controller.set_obstacles(Obstacles::none());
   controller.set_goal(constant(0.5));
   BOOST_CHECK_THROW(controller.set_goal(constant(3.0)), std::invalid_argument);
   BOOST_CHECK_THROW(controller.set_goal(constant(std::nan(""))), std::invalid_argument);
@@ -171,6 +176,7 @@ BOOST_AUTO_TEST_CASE(an_arm_file_is_all_that_a_program_needs) {
   const auto path = std::filesystem::temp_directory_path() / "sidestep_controller_test.arm";
   make_arm().save(path);
   Controller controller(Arm::load(path), synchronous());
+  controller.set_obstacles(Obstacles::none());
   std::filesystem::remove(path);
   controller.set_goal(constant(0.3));
   const MotionRecord record = integrate(controller, constant(0.0), constant(0.0), 6000, constant(0.3), 0.01);

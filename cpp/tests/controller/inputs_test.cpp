@@ -79,6 +79,7 @@ Eigen::Vector3d tip_of(const Arm& arm, const Eigen::VectorXd& q) {
 BOOST_AUTO_TEST_CASE(a_velocity_is_reached_scaled_to_the_limits_and_given_up_when_commands_stop) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
   wanted[0] = 0.3;
@@ -107,6 +108,7 @@ BOOST_AUTO_TEST_CASE(a_velocity_is_reached_scaled_to_the_limits_and_given_up_whe
 BOOST_AUTO_TEST_CASE(what_is_wrong_with_an_order_is_named_and_the_order_before_stays) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
   wanted[0] = 0.3;
   controller.set_velocity(wanted);
@@ -142,6 +144,7 @@ BOOST_AUTO_TEST_CASE(a_twist_is_followed_in_axes_of_the_world_and_of_the_frame) 
   const int tip = arm.robot().frame_index("tip");
   for (const bool local : {false, true}) {
     Controller controller(arm, repeatable());
+    controller.set_obstacles(Obstacles::none());
     Model model;
     Vector6d twist;
     twist << 0.05, -0.1, 0.04, 0.1, 0.0, -0.2;
@@ -174,6 +177,7 @@ BOOST_AUTO_TEST_CASE(a_twist_rests_at_a_joint_limit_and_comes_back) {
   const Arm arm = covered_arm(limits);
   const int tip = arm.robot().frame_index("tip");
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Vector6d twist = Vector6d::Zero();
   twist[5] = 0.3;  // the tip turns about the vertical
@@ -197,6 +201,7 @@ BOOST_AUTO_TEST_CASE(a_twist_rests_at_a_joint_limit_and_comes_back) {
 BOOST_AUTO_TEST_CASE(a_twist_through_a_singular_configuration_stays_within_limits_and_comes_back) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   const Eigen::Vector3d before = tip_of(arm, model.q);
   Vector6d twist = Vector6d::Zero();
@@ -216,6 +221,7 @@ BOOST_AUTO_TEST_CASE(a_twist_through_a_singular_configuration_stays_within_limit
 BOOST_AUTO_TEST_CASE(a_trajectory_is_kept_to_a_milliradian_and_arrives_in_time) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::MatrixXd q;
   Eigen::VectorXd times, end = bent();
@@ -240,6 +246,7 @@ BOOST_AUTO_TEST_CASE(a_trajectory_is_kept_to_a_milliradian_and_arrives_in_time) 
 BOOST_AUTO_TEST_CASE(a_trajectory_that_is_too_fast_is_run_as_fast_as_limits_allow_on_its_path) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd end = bent();
   end.array() += 0.5;
@@ -262,6 +269,7 @@ BOOST_AUTO_TEST_CASE(a_trajectory_that_is_too_fast_is_run_as_fast_as_limits_allo
 BOOST_AUTO_TEST_CASE(a_first_sample_later_than_the_order_is_led_to) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd end = bent();
   end.array() += 0.2;
@@ -277,6 +285,7 @@ BOOST_AUTO_TEST_CASE(a_first_sample_later_than_the_order_is_led_to) {
 BOOST_AUTO_TEST_CASE(keep_path_waits_before_what_blocks_it_and_goes_on_when_that_is_taken_away) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd end = bent();
   end[0] += 1.5;
@@ -314,6 +323,7 @@ BOOST_AUTO_TEST_CASE(keep_path_waits_before_what_blocks_it_and_goes_on_when_that
 BOOST_AUTO_TEST_CASE(steer_goes_around_and_rejoins) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable());
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd end = bent(), halfway = bent();
   end[0] += 1.5;
@@ -342,6 +352,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_velocities_twists_and_traject
   ControllerSettings settings;
   settings.output = ControllerSettings::Output::torque;
   Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
   Model model;
   Eigen::VectorXd end = bent();
   end.array() += 0.3;
@@ -362,7 +373,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_velocities_twists_and_traject
         } else {
           controller.set_trajectory(q, times, kind == 2 ? TrajectoryBehaviour::keep_path : TrajectoryBehaviour::steer);
         }
-        controller.set_obstacles(ball({0.5, 0.4, 1.2}, 0.05, {0.0, -0.1, 0.0}));
+        controller.set_obstacles(ball({0.5, 0.4, 1.2}, 0.05, {0.0, -0.1, 0.0}), test::for_ever);
       })
           .join();
     }

@@ -63,13 +63,14 @@ BOOST_AUTO_TEST_CASE(synchronous_motions_repeat_bit_for_bit) {
     ControllerSettings own = settings;
     own.seed = seed;
     Controller controller(arm, own);
+    controller.set_obstacles(Obstacles::none());
     controller.set_goal(pose_of(arm.robot(), swing_to));
     const Eigen::Vector3d ball = in_the_way(arm.robot(), 0.0).points().col(0);
     Eigen::Matrix3Xd points(3, 2), velocities = Eigen::Matrix3Xd::Zero(3, 2);
     points.col(0) = ball;
     points.col(1) << 1.0, 1.0, 1.2;
     velocities.col(1) << -0.5, -0.5, 0.0;
-    controller.set_obstacles(Obstacles(points, Eigen::VectorXd::Constant(2, 0.06), velocities));
+    controller.set_obstacles(Obstacles(points, Eigen::VectorXd::Constant(2, 0.06), velocities), test::for_ever);
     return integrate(controller, swing_from, Eigen::VectorXd::Zero(nv), 1500);
   };
   const MotionRecord first = motion(0);
@@ -106,8 +107,9 @@ BOOST_AUTO_TEST_CASE(with_any_part_left_out_it_arrives_or_says_why_not) {
         BOOST_TEST_CONTEXT("without " << parts << ", pose " << pose << ", torque "
                                       << (output == ControllerSettings::Output::torque)) {
           Controller controller(arm, settings);
+          controller.set_obstacles(Obstacles::none());
           BOOST_TEST(controller.has_torque() == (output == ControllerSettings::Output::torque));
-          controller.set_obstacles(in_the_way(robot, -0.1));
+          controller.set_obstacles(in_the_way(robot, -0.1), test::for_ever);
           if (pose) {
             controller.set_goal(pose_of(robot, swing_to));
           } else {
@@ -149,6 +151,7 @@ BOOST_AUTO_TEST_CASE(a_joint_without_limits_takes_the_short_way_also_where_its_e
           settings.planner.reset();
         }
         Controller controller(arm, settings);
+        controller.set_obstacles(Obstacles::none());
         Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.4), v = Eigen::VectorXd::Zero(nv), goal = q;
         q[0] = 3.0;
         goal[0] = -3.0;
@@ -191,6 +194,7 @@ BOOST_AUTO_TEST_CASE(integrate_sees_a_turn_more_as_the_same_place) {
   ControllerSettings settings;
   settings.synchronous = true;
   Controller controller(covered_arm(limits), settings);
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.4), goal = q;
   q[0] = 3.0;
   goal[0] = -3.0;
@@ -208,6 +212,7 @@ BOOST_AUTO_TEST_CASE(arms_without_limits_pairs_or_more_than_one_joint_move) {
     ControllerSettings settings;
     settings.synchronous = true;
     Controller controller(arm, settings);
+    controller.set_obstacles(Obstacles::none());
     BOOST_TEST(!controller.has_torque());
     const Eigen::VectorXd goal = Eigen::VectorXd::Constant(num, 0.5);
     controller.set_goal(goal);
@@ -242,6 +247,7 @@ BOOST_AUTO_TEST_CASE(poses_are_reached_in_a_free_workspace) {
       there = draw();
     }
     Controller controller(arm, settings);
+    controller.set_obstacles(Obstacles::none());
     const PoseGoal goal = pose_of(robot, there);
     controller.set_goal(goal);
     const bool arrived = arrives(controller, q, v, 20000);
@@ -258,6 +264,7 @@ BOOST_AUTO_TEST_CASE(poses_are_reached_in_a_free_workspace) {
 BOOST_AUTO_TEST_CASE(a_posture_that_is_searched_for_an_old_goal_is_not_followed) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm);  // with its worker
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   Random random(5);
   Eigen::VectorXd last = swing_to;

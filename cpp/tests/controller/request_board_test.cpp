@@ -6,6 +6,7 @@
 
 #include "../../src/controller/request_board.hpp"
 #include "support/covered_arm.hpp"
+#include "support/stage_model.hpp"
 
 using namespace sidestep;
 
@@ -22,28 +23,28 @@ BOOST_AUTO_TEST_CASE(a_board_numbers_what_is_put_and_hands_it_to_the_step) {
   BOOST_TEST(board.last_measured().size() == 0);
   const Eigen::Vector2d velocity(0.1, 0.2);
   board.put(VelocityRequest{velocity}, "why so fast?");
-  board.put(test::ball(board_place, 0.1), "", nobody);
+  board.put(test::world_of(test::ball(board_place, 0.1)), "", nobody);
   BOOST_TEST(board.request_number() == 1u);
   BOOST_TEST(board.requests().get().number == 1u);
   BOOST_TEST((std::get<VelocityRequest>(board.requests().get().request).velocity == velocity));
-  BOOST_TEST(board.obstacles().get().number == 1u);
-  BOOST_TEST((board.newest_obstacles().obstacles->points().col(0) == board_place));
+  BOOST_TEST(board.worlds().get().number == 1u);
+  BOOST_TEST((board.newest_world()->obstacles.points().col(0) == board_place));
   BOOST_TEST((board.request(0).index() == 0));  // there is a newer one
   BOOST_TEST((board.request(1).index() != 0));
   BOOST_TEST(board.questions().order == "why so fast?");
   BOOST_TEST(board.questions().order_is_newer);
-  board.put(test::ball(board_place, 0.1), "so far away?", nobody);
+  board.put(test::world_of(test::ball(board_place, 0.1), 2), "so far away?", nobody);
   BOOST_TEST(!board.questions().order_is_newer);
   board.number_next_request(7);
   board.put(Request(), "");
   BOOST_TEST(board.request_number() == 7u);
-  BOOST_TEST(board.newest_obstacles().number == 2u);
+  BOOST_TEST(board.newest_world()->number == 2u);
 }
 
 BOOST_AUTO_TEST_CASE(only_the_newest_obstacles_are_shared_and_only_the_newest_request_has_a_posture) {
   RequestBoard board(2);
   Eigen::Index given = 0;
-  board.put(test::ball(board_place, 0.1), "", [&](const Obstacles& obstacles) { given = obstacles.size(); });
+  board.put(test::world_of(test::ball(board_place, 0.1)), "", [&](const Obstacles& obstacles) { given = obstacles.size(); });
   BOOST_TEST(given == 1);
   int shared = 0;
   board.share_if_newest(1, [&] { ++shared; });
@@ -83,17 +84,16 @@ BOOST_AUTO_TEST_CASE(what_belongs_together_is_read_together_while_another_thread
 BOOST_AUTO_TEST_CASE(another_board_takes_over_everything_with_its_numbers) {
   RequestBoard before(2), after(2);
   before.number_next_request(5);
-  before.number_next_obstacles(9);
   before.put(Goal(JointGoal(Eigen::Vector2d(0.1, 0.2))), "a question");
-  before.put(test::ball(board_place, 0.1), "", nobody);
+  before.put(test::world_of(test::ball(board_place, 0.1), 9), "", nobody);
   Eigen::Index given = 0;
   after.take_over(before, [&](const Obstacles& obstacles) { given = obstacles.size(); });
   BOOST_TEST(given == 1);
   BOOST_TEST(after.request_number() == 5u);
-  BOOST_TEST(after.newest_obstacles().number == 9u);
+  BOOST_TEST(after.newest_world()->number == 9u);
   BOOST_TEST(after.requests().get().number == 5u);
-  BOOST_TEST(after.obstacles().get().number == 9u);
-  BOOST_TEST((after.obstacles().get().obstacles.points().col(0) == board_place));
+  BOOST_TEST(after.worlds().get().number == 9u);
+  BOOST_TEST((after.worlds().get().obstacles.points().col(0) == board_place));
   BOOST_TEST(after.questions().order == "a question");
   BOOST_TEST((std::get<Goal>(after.newest().request).index() == 0));
 }

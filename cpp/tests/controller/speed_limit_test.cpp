@@ -53,6 +53,7 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
   settings.local_minimum.reset();
   settings.synchronous = true;
   Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
   controller.set_obstacles(obstacles);
   if (goal) {
     controller.set_goal(*goal);
@@ -168,6 +169,7 @@ BOOST_AUTO_TEST_CASE(the_limit_is_held_on_a_path_of_the_planner_without_allocati
   ControllerSettings settings;
   settings.speed_limits = SpeedLimitSettings{0.2, 0.1, 0.5, 1.0};
   Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
   const Eigen::Vector3d tip = frames_at(arm.robot(), turned(0.0), Eigen::VectorXd::Zero(nv)).tip;
   controller.set_obstacles(test::ball(tip + Eigen::Vector3d(0.15, 0.0, 0.0), 0.03));
   controller.set_goal(turned(1.2));

@@ -98,6 +98,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     settings.look_ahead->tries = 30;
     const Arm arm = covered_arm(test::arm_limits(nv));
     Controller controller(arm, settings);
+    controller.set_obstacles(Obstacles::none());
     std::atomic<bool> done{false};
     std::atomic<int> steps{0};
     std::thread other([&] {
@@ -116,7 +117,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
             0) {  // comes from afar at the middle of the arm where it will be, too large and too fast for it to back off
           const KinematicState there = state_at(arm.robot(), k % 2 == 0 ? left : right);
           const Eigen::Vector3d at = frame_pose(arm.robot(), there, arm.robot().frame_index("link4")).translation();
-          controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.25, {0.0, -3.0, 0.0}));
+          controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.25, {0.0, -3.0, 0.0}), test::for_ever);
         } else {
           controller.set_obstacles(random_balls(random, 1 + k % 4, 0.0));
         }
@@ -155,6 +156,7 @@ BOOST_AUTO_TEST_CASE(an_impedance_allocates_nothing) {
   settings.look_ahead.reset();
   settings.tracking.stiffness = 5.0;
   Controller controller(covered_arm(test::arm_limits(nv)), settings);
+  controller.set_obstacles(Obstacles::none());
   controller.set_goal(Eigen::VectorXd::Constant(nv, 0.3));
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   std::size_t allocations = 0;
@@ -185,6 +187,7 @@ BOOST_AUTO_TEST_CASE(clearances_bind_whatever_the_goal_is) {
         }
         const Arm arm = covered_arm(test::arm_limits(nv));
         Controller controller(arm, settings);
+        controller.set_obstacles(Obstacles::none());
         // The tip, at (0.6, 0, 1.5) or so, moves towards a ball at rest.
         Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = Eigen::VectorXd::Zero(nv);
         q[3] = 1.2;
@@ -243,6 +246,7 @@ BOOST_AUTO_TEST_CASE(status_and_clearance_tell_the_truth_about_the_covering_body
   settings.look_ahead.reset();
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
   Random random(11);
   int touched = 0, apart = 0;
   for (int k = 0; k < 3000; ++k) {
@@ -271,6 +275,7 @@ BOOST_AUTO_TEST_CASE(points_that_outweigh_the_one_that_touches_hide_nothing) {
   settings.synchronous = true;
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
   // beside the first link, which has a semi-axis of 5 cm in y
   Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 200);
   points.row(1).setConstant(0.05 + 1e-3);
@@ -288,6 +293,7 @@ BOOST_AUTO_TEST_CASE(a_state_that_is_unusable_stops_the_arm_and_is_said) {
   ControllerSettings settings;
   settings.synchronous = true;
   Controller controller(covered_arm(test::arm_limits(nv)), settings);
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd goal = Eigen::VectorXd::Constant(nv, 0.4);
   controller.set_goal(goal);
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.1), v = Eigen::VectorXd::Constant(nv, 0.2);
@@ -315,6 +321,7 @@ BOOST_AUTO_TEST_CASE(torque_without_inertias_needs_the_mass_matrix_in_every_step
   settings.synchronous = true;
   settings.output = ControllerSettings::Output::torque;
   Controller controller(covered_arm(test::arm_limits(nv), true, false), settings);
+  controller.set_obstacles(Obstacles::none());
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.1), v = Eigen::VectorXd::Zero(nv);
   BOOST_TEST(to_string(controller.step(q, v).status) == "stopping");
   BOOST_TEST(controller.explain().find("mass_matrix") != std::string::npos);

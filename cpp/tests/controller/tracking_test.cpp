@@ -32,6 +32,7 @@ JointLimits limits_with_rates() {
 BOOST_AUTO_TEST_CASE(positions_and_velocities_integrate_the_acceleration_whatever_the_drives_do) {
   for (const double lag : {0.0, 0.02}) {
     Controller controller(covered_arm(limits_with_rates()), repeatable_settings(ControllerSettings::Output::position));
+    controller.set_obstacles(Obstacles::none());
     controller.set_goal(to);
     const double period = controller.settings().period;
     Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), position = q, velocity = v;
@@ -52,6 +53,7 @@ BOOST_AUTO_TEST_CASE(positions_and_velocities_integrate_the_acceleration_whateve
 
 BOOST_AUTO_TEST_CASE(velocities_lead_the_arm_back_to_the_reference) {
   Controller controller(covered_arm(limits_with_rates()), repeatable_settings(ControllerSettings::Output::velocity));
+  controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = from;
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
   BOOST_TEST(controller.step(q, rest).velocity.norm() == 0.0);
@@ -71,6 +73,7 @@ BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
   limits.jerk.setConstant(200.0);
   const Arm arm = covered_arm(limits);
   Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
+  controller.set_obstacles(Obstacles::none());
   const double period = controller.settings().period;
   Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), a = v, held(nv);
   const RigidBodyDynamics dynamics(arm.dynamics());
@@ -99,6 +102,7 @@ BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
 BOOST_AUTO_TEST_CASE(an_arm_with_a_payload_arrives_and_the_payload_is_found) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
+  controller.set_obstacles(Obstacles::none());
   controller.set_goal(to);
   const double period = controller.settings().period;
   const RigidBodyDynamics model(arm.dynamics());
@@ -143,6 +147,7 @@ BOOST_AUTO_TEST_CASE(where_the_torque_cannot_hold_the_arm_it_does_not_go) {
   limits.effort[1] = std::abs(bias[1]) / 1.1;
   const Arm arm = covered_arm(limits);
   Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
+  controller.set_obstacles(Obstacles::none());
   const double period = controller.settings().period, allowed = 1.0 - controller.settings().effort_margin;
   const RigidBodyDynamics model(arm.dynamics());
   RigidBodyDynamics::Workspace of_model(model);

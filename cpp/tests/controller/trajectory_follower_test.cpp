@@ -107,6 +107,22 @@ BOOST_AUTO_TEST_CASE(a_path_that_is_kept_waits_before_an_obstacle_and_goes_on_wh
   BOOST_TEST(std::abs(t.reference.q[0] - 1.2) < 1e-3);  // ω = 10: e^(−10 t) of 0.2 s or more
 }
 
+BOOST_AUTO_TEST_CASE(a_slow_path_that_is_kept_waits_as_well_and_is_not_left) {
+  for (const double speed : {0.02, 0.05, 0.1, 0.2}) {
+    Tracing t(speed);
+    ClearanceQuery::Workspace workspace(t.body);
+    t.go_on_until(1.2 / speed, in_the_way);
+    const double clearance = t.body.nearest(t.reference.q, in_the_way, 1.0, workspace).clearance;
+    BOOST_TEST_CONTEXT("speed " << speed << " clearance " << clearance) {
+      BOOST_TEST(clearance > t.settings.safety.margin - 0.002);  // once on the way it may be 1 mm less
+      BOOST_TEST(t.follower.rate() < 1e-6);
+      const double waits_at = t.follower.time();
+      t.go_on_until(1.2 / speed + 5.0, in_the_way);
+      BOOST_TEST(std::abs(t.follower.time() - waits_at) * speed < 1e-4);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_motion_that_begins_anew_goes_on_from_where_its_clock_is) {
   Tracing t(slow_path);
   t.go_on_until(2.0);

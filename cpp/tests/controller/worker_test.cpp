@@ -43,7 +43,7 @@ struct Working {
     Snapshot& s = worker.draft();
     s.time = time;
     s.request_number = request;
-    s.obstacle_number = board.newest_obstacles().number;
+    s.world_number = board.newest_world()->number;
     s.by_pose = by_pose;
     s.places.num = 1;
     s.written = std::chrono::steady_clock::now();
@@ -86,7 +86,7 @@ BOOST_AUTO_TEST_CASE(a_worker_finds_a_posture_for_the_pose_that_it_is_told_of_an
 BOOST_AUTO_TEST_CASE(a_worker_lowers_barriers_at_places_among_the_obstacles_that_stand_on_the_board) {
   Working w;
   w.board.put(Goal(JointGoal(worker_goal)), "");
-  w.board.put(test::ball({0.09, 0.0, 1.0}, 0.03), "", [](const Obstacles&) {});  // 2 cm beside a link, upright
+  w.board.put(test::world_of(test::ball({0.09, 0.0, 1.0}, 0.03)), "", [](const Obstacles&) {});  // 2 cm beside a link, upright
   w.worker.start(w.goal, w.look_ahead);
   w.tell(1, false);
   BOOST_TEST(comes_true([&] { return w.worker.activations().update(); }));
@@ -95,7 +95,7 @@ BOOST_AUTO_TEST_CASE(a_worker_lowers_barriers_at_places_among_the_obstacles_that
   Places places(nv);
   places.num = 1;
   GeometricSystem::Workspace workspace(*w.model.system);
-  BOOST_TEST(!w.distances.lower_at(places, *w.board.newest_obstacles().obstacles, workspace, expected));
+  BOOST_TEST(!w.distances.lower_at(places, w.board.newest_world()->obstacles, workspace, expected));
   BOOST_TEST(found.request_number == 1u);
   BOOST_TEST((found.values == expected));
   BOOST_TEST((found.values != w.model.system->activations()));
@@ -105,7 +105,8 @@ BOOST_AUTO_TEST_CASE(a_worker_lowers_barriers_at_places_among_the_obstacles_that
 BOOST_AUTO_TEST_CASE(a_worker_looks_ahead_once_in_a_delay_and_says_from_which_state_it_did) {
   Working w;
   w.board.put(Goal(JointGoal(worker_goal)), "");
-  w.board.put(test::ball({0.6, 0.0, 1.0}, 0.05, {-1.0, 0.0, 0.0}), "", [](const Obstacles&) {});  // it comes in half a second
+  w.board.put(test::world_of(test::ball({0.6, 0.0, 1.0}, 0.05, {-1.0, 0.0, 0.0})), "",
+              [](const Obstacles&) {});  // it comes in half a second
   w.worker.start(w.goal, w.look_ahead);
   w.tell(1, false, 0.5);
   BOOST_TEST(comes_true([&] { return w.look_ahead.buffer().update(); }));

@@ -111,3 +111,54 @@ BOOST_AUTO_TEST_CASE(queries_allocate_nothing) {
   BOOST_TEST(found >= 0);
   BOOST_TEST(allocations == 0);
 }
+
+BOOST_AUTO_TEST_CASE(joined_sets_are_one_tree_whose_parts_move_by_themselves) {
+  Random random(5);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<Obstacles> sets;
+    for (int k = 0; k < 4; ++k) {
+      sets.push_back(k == 1 ? Obstacles::none() : test::random_obstacles(random, random.integer(1, 1200)));
+    }
+    Obstacles joined = Obstacles::join({&sets[0], &sets[1], &sets[2], &sets[3]});
+    BOOST_REQUIRE(joined.num_parts() == 4u);
+    joined.advance(2, 0.3);
+    sets[2].advance(0.3);
+    joined.freeze(3);
+    sets[3] = sets[3].frozen();
+    joined.advance(0.2);
+    for (Obstacles& set : sets) {
+      set.advance(0.2);
+    }
+    if (trial % 2 == 1) {
+      joined.hide(0);
+      sets[0] = Obstacles::none();
+    }
+    for (int query = 0; query < 20; ++query) {
+      const Eigen::Vector3d place = 0.6 * random.matrix(3, 1);
+      double least = 10.0;
+      for (const Obstacles& set : sets) {
+        least = scanned(set, place, least);
+      }
+      int looked = 0;
+      const PointTree::Nearest found = nearest(joined.tree(), place, 10.0, -10.0, looked);
+      BOOST_TEST(std::abs(found.distance - least) < single);
+      if (found.point >= 0) {
+        const int n = joined.tree().order()[static_cast<std::size_t>(found.point)];
+        BOOST_TEST(std::abs((joined.points().col(n) - place).norm() - joined.radii()[n] - found.distance) < single);
+        BOOST_TEST(joined.part_begin(joined.part_of(n)) <= n);
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(points_get_other_velocities_and_say_how_uncertain_they_are) {
+  const Obstacles ball(Eigen::Vector3d::Zero(), Eigen::VectorXd::Constant(1, 0.1), Eigen::Vector3d::Zero());
+  Obstacles moving = ball.moving(Eigen::Vector3d(1.0, 0.0, 0.0), Eigen::VectorXd::Constant(1, 0.5));
+  BOOST_TEST(moving.uncertainty()[0] == 0.5);
+  BOOST_TEST(ball.uncertainty()[0] == 0.0);
+  BOOST_TEST(moving.advance(0.2));
+  int looked = 0;
+  BOOST_TEST(std::abs(nearest(moving.tree(), Eigen::Vector3d(1.2, 0.0, 0.0), 10.0, -1.0, looked).distance - 0.9) < single);
+  BOOST_CHECK_THROW(ball.moving(Eigen::Vector3d::Zero(), Eigen::VectorXd::Constant(1, -0.1)), std::invalid_argument);
+  BOOST_CHECK_THROW(ball.moving(Eigen::Matrix3Xd::Zero(3, 2), Eigen::VectorXd::Zero(1)), std::invalid_argument);
+}

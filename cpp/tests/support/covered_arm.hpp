@@ -52,6 +52,9 @@ inline PoseGoal pose_of(const Robot& robot, const Eigen::VectorXd& q) {
   return PoseGoal(robot, "tip", frame_pose(robot, state_at(robot, q), robot.frame_index("tip")));
 }
 
+/// Of what moves as it was told, and that nobody tells again.
+inline const SourceOptions for_ever{.valid_for = std::numeric_limits<double>::infinity()};
+
 inline Obstacles ball(const Eigen::Vector3d& point, double radius, const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero()) {
   return Obstacles(point, Eigen::VectorXd::Constant(1, radius), velocity);
 }

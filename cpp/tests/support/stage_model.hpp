@@ -6,6 +6,7 @@
 #include "../../src/controller/closing_estimate.hpp"
 #include "../../src/controller/model.hpp"
 #include "../../src/controller/reference.hpp"
+#include "../../src/controller/source_registry.hpp"
 #include "support/covered_arm.hpp"
 #include "support/repeatable_settings.hpp"
 
@@ -38,6 +39,14 @@ inline Reference reference_at(const Eigen::VectorXd& q, const Eigen::VectorXd& v
   reference.q = reference.next_q = q;
   reference.v = reference.next_v = v;
   return reference;
+}
+
+/// A world of one source, "scene", which is valid for ever.
+inline World world_of(Obstacles obstacles, std::uint64_t number = 1) {
+  World world{number, obstacles, {}};
+  world.sources.push_back({"scene", 1, number, SourceOptions::untold, SourceOptions::untold, number,
+                           std::numeric_limits<double>::infinity(), false, false, std::make_shared<const Obstacles>(obstacles)});
+  return world;
 }
 
 }  // namespace sidestep::test

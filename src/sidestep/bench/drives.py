@@ -130,7 +130,7 @@ def random_drive(robot: Robot, settings: DriveSettings, index: int) -> Encounter
 
     def tell(controller: Controller, step: int, q: Array) -> None:
         if step == 0:
-            controller.set_obstacles(obstacles)
+            controller.set_obstacles(obstacles, valid_for=np.inf)  # as they move, without a tracker
         controller.set_velocity(speeds[step // HOLD])
 
     return Encounter(index, start, STEPS, tuple(balls[k] for k in kept), tell)

@@ -149,7 +149,7 @@ class ControllerRunner:
         while steps := columns.next_steps(FIRST_CHUNK if planned is None else CHUNK):
             obstacles = seen(columns.done * settings.period)
             if obstacles is not None:
-                controller.set_obstacles(obstacles)
+                controller.set_obstacles(obstacles, valid_for=np.inf)
             goal = problem.goal if pose is None else None
             part = integrate(controller, q, v, steps=steps, goal=goal, tolerance=settings.tolerance)
             near = columns.near(part.q) if pose is None else _at_pose(pose, part.q)

@@ -178,7 +178,7 @@ def _scene(
         Arm.from_robot(robot),
         ControllerSettings(planner=None, look_ahead=None, synchronous=True, output="acceleration"),
     )
-    controller.set_obstacles(obstacles)
+    controller.set_obstacles(obstacles, valid_for=np.inf)
     return robot, controller, obstacles, rng
 
 

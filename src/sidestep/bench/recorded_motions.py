@@ -143,6 +143,7 @@ def disturbed(output: str) -> None:
 def impedance() -> None:
     arm, q, v = ready_arm()
     controller = controller_of(arm, output="torque", tracking=TrackingSettings(stiffness=0.5))
+    controller.set_obstacles(Obstacles.none())
     controller.set_goal(q + 0.2)
     for _ in range(steps_in(RUN_SECONDS)):
         q, v = ideal_step(controller, q, v)

@@ -289,7 +289,7 @@ class _ControllerRow(_Row):
     def _controller(self) -> Controller:
         settings = ControllerSettings(planner=None, look_ahead=None, synchronous=True, output=self.output)
         controller = Controller(self.arm, settings)
-        controller.set_obstacles(self.obstacles)
+        controller.set_obstacles(self.obstacles, valid_for=np.inf)
         return controller
 
     def _from_cpp(self, state: _State, goal: Array, steps: int) -> tuple[_State, Array]:

@@ -65,17 +65,15 @@ def obstacles_from_shapes(
     points, radii, velocities = (np.concatenate([part[k] for part in parts]) for k in range(3))
     if len(points) == 0:
         return Obstacles.none()
-    runs = [
-        (name, sum(count for _, count in run))
-        for name, run in groupby((group for part in parts for group in part[3]), key=lambda group: group[0])
-    ]
+    groups = [group for part in parts for group in part[3]]
+    runs = [list(run) for _, run in groupby(groups, key=lambda group: group[0])]
     return Obstacles(points, radii, velocities).named(
-        [name for name, _ in runs], [count for _, count in runs]
+        [run[0][0] for run in runs], [sum(group[1] for group in run) for run in runs], [run[0][2] for run in runs]
     )
 
 
 Sampling = tuple[float, float] | None  # spacing and radius [m], or None: by excess
-Part = tuple[Points, Points, Points, list[tuple[str, int]]]  # points, radii, velocities, names with counts
+Part = tuple[Points, Points, Points, list[tuple[str, int, Points]]]  # points, radii, velocities; name, count, pose
 
 
 def _listed(items: Seen) -> list[Obstacles | Shape]:
@@ -91,7 +89,7 @@ def _part(item: Obstacles | Shape, index: int, *, excess: float, sampled: Sampli
     """What is seen of an item."""
     unnamed = f"obstacle{index}"
     if isinstance(item, Obstacles):
-        groups = [(name or unnamed, count) for name, count in item.groups]
+        groups = [(name or unnamed, count, np.eye(4)) for name, count in item.groups]
         return item.points, item.radii, item.velocities, groups
     if not is_shape(item):
         raise TypeError(
@@ -103,7 +101,7 @@ def _part(item: Obstacles | Shape, index: int, *, excess: float, sampled: Sampli
         points, radii = _balls(item, excess, sampled)
     except ValueError as error:
         raise ValueError(f"{type(item).__name__} {name!r}: {error}") from error
-    return points, radii, np.tile(item.velocity, (len(points), 1)), [(name, len(points))]
+    return points, radii, np.tile(item.velocity, (len(points), 1)), [(name, len(points), item.pose)]
 
 
 def _kind(value: object) -> str:

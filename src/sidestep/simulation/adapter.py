@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
@@ -68,7 +69,7 @@ class ControllerAdapter:
         self.controller = controller
         self._see = obstacles if callable(obstacles) else None
         if not callable(obstacles):
-            controller.set_obstacles(obstacles)
+            controller.set_obstacles(obstacles, valid_for=math.inf)  # the world is what it is said to be
 
     def drive(
         self,
@@ -81,7 +82,7 @@ class ControllerAdapter:
         """One step of the controller; without masses by its own dynamics."""
         seen = None if self._see is None else self._see(time)
         if seen is not None:
-            self.controller.set_obstacles(seen)
+            self.controller.set_obstacles(seen, valid_for=math.inf)
         if self.controller.has_torque and mass_matrix is not None:
             command = self.controller.step(q, v, mass_matrix, bias)
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -113,7 +114,7 @@ class ControllerAdapter:
         if self._told is not None:
             self._told.advance(self._settings.period)
         if self._told is None or not alike(self._told, obstacles):
-            self._controller.set_obstacles(obstacles)
+            self._controller.set_obstacles(obstacles, valid_for=math.inf)  # they are where the page has them
             self._told = obstacles
         self._said, self._seen, self._q = self._controller, obstacles, q
         return self._controller.step(q, v, mass_matrix, bias).torque
@@ -125,7 +126,7 @@ class ControllerAdapter:
         settings.planner = settings.look_ahead = settings.local_minimum = None
         self._said = Controller(self._arm, settings)
         self._said.set_goal(self._goal)
-        self._said.set_obstacles(obstacles)
+        self._said.set_obstacles(obstacles, valid_for=math.inf)
         self._said.step(q, v)
         self._seen, self._q = obstacles, q
 

@@ -29,6 +29,7 @@ _ROOMS = {
         "LookAheadSettings",
         "OnlinePlannerSettings",
         "PlannerSettings",
+        "SourceSettings",
         "SpeedLimitSettings",
         "TimedPathSettings",
         "TrackingSettings",

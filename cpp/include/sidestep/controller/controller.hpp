@@ -16,6 +16,7 @@
 #include "sidestep/controller/recording.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/single_stepper.hpp"
+#include "sidestep/controller/source.hpp"
 #include "sidestep/attractor/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
 #include "sidestep/arm/arm.hpp"
@@ -25,6 +26,7 @@
 namespace sidestep {
 
 class Recorder;
+class SourceRegistry;
 
 /// Which part of a twist is left free.
 enum class TwistFreedom {
@@ -103,8 +105,26 @@ class Controller {
   /// and the status is `tracking_lost`.
   void restart() noexcept { restarts_.store(true, std::memory_order_release); }
 
-  /// Replaces all obstacles, from the next step on. Points move on by their velocities until the next call.
-  void set_obstacles(Obstacles obstacles);
+  // What each source of obstacles says, from the next step on. Until anything was set the arm stays where it is. All of these throw
+  // std::invalid_argument that names the value and what is allowed; then nothing changes.
+
+  /// Replaces what a source said before, and nothing of the others. Points move on by their velocities, from the time of their capture
+  /// on, up to the age for which the source is valid; beyond it the arm stops until the source comes again, see SourceOptions. An empty
+  /// set after one with points is believed once it has been empty for SourceSettings::empty_after.
+  void set_obstacles(Obstacles obstacles, const SourceOptions& options = {});
+  /// Forgets a source, at once.
+  void remove_obstacles(const std::string& source);
+  /// Adds named points to a source, see Obstacles::named. Throws also where it has something of that name.
+  void add_obstacle(const Obstacles& obstacle, const std::string& source = SourceOptions::scene);
+  /// Moves what has a name rigidly to another pose in the world: from that with which it was named, or from the origin. A tracker that
+  /// comes again and again is one that can fail, as with `set_obstacles`.
+  void move_obstacle(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options = {});
+  /// Removes what has a name, at once.
+  void remove_obstacle(const std::string& name, const std::string& source = SourceOptions::scene);
+  /// What is believed of each source. Only for the thread of `step`; allocates.
+  std::vector<SourceState> sources() const;
+  /// Clock on which obstacles are captured: time of the last step [s]; from any thread.
+  double time() const noexcept { return time_.load(std::memory_order_relaxed); }
 
   // Each of these prepares another body while steps go on, in a few tenths of a second, and returns. The next step uses the new
   // body. The planner plans again, from where the arm is.
@@ -191,6 +211,11 @@ class Controller {
   Controller(Arm arm, ControllerSettings settings, bool workers);
   template <class Action>
   void tell(Action&& action);
+  template <class Action>
+  void tell_locked(Action&& action);  // with setters_ locked
+  template <class Change>
+  void change_sources(const Obstacles& said, Change&& change);
+  double now() const noexcept;
   void take_over() noexcept;
   struct Held {
     Attachment object;
@@ -211,10 +236,11 @@ class Controller {
   Command command_;
   const Command refused_;  // Command for a thread that steps while another one does.
   SingleStepper stepper_;
-  std::unique_ptr<Impl> impl_;           // Used by the thread of `step`.
-  std::atomic<Impl*> next_{nullptr};     // which it takes over in the next step
-  std::atomic<Impl*> retired_{nullptr};  // those before, for another thread to destroy
-  std::atomic<bool> restarts_{false};    // The next step restarts.
+  std::unique_ptr<SourceRegistry> registry_;  // guarded by setters_
+  std::unique_ptr<Impl> impl_;                // Used by the thread of `step`.
+  std::atomic<Impl*> next_{nullptr};          // which it takes over in the next step
+  std::atomic<Impl*> retired_{nullptr};       // those before, for another thread to destroy
+  std::atomic<bool> restarts_{false};         // The next step restarts.
   mutable std::mutex setters_;
   Impl* newest_;                // Newest of those that step, which setters tell.
   Impl* lifted_ = nullptr;      // the one that newest_ goes over to, which they tell too
@@ -226,6 +252,7 @@ class Controller {
   std::unique_ptr<Recorder> recorder_;
   std::atomic<Recorder*> records_{nullptr};  // Used by the thread of `step`; null once the recording has ended.
   std::atomic<bool> in_use_{false};
+  std::atomic<double> time_{0.0};
 };
 
 }  // namespace sidestep

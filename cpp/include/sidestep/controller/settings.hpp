@@ -60,6 +60,13 @@ struct InputSettings {
   double lead = 0.1;
 };
 
+/// How long obstacles are believed, see Controller::set_obstacles.
+struct SourceSettings {
+  double valid_for = 0.25;     ///< age up to which a source is believed that comes again and again, moves or has a time [s]
+  double largest_speed = 2.0;  ///< largest speed of what nobody has told of [m/s]
+  double empty_after = 2.0;    ///< time for which a source must stay empty before that is believed [s]
+};
+
 /// All settings of a Controller. Every part but speed_limits is on by default; an empty optional leaves a part out.
 struct ControllerSettings {
   /// What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state; position and
@@ -79,7 +86,7 @@ struct ControllerSettings {
   double stop_damping = 0.25;
   double torque_weight = 1e-6, slack_weight = 1e3;
   double velocity_overrun = 1.2, acceleration_overrun = 10.0;
-  double obstacle_timeout = std::numeric_limits<double>::infinity();  ///< age above which obstacles count as stale [s]
+  double obstacle_timeout = std::numeric_limits<double>::infinity();  ///< age above which any source counts as stale [s]
   bool local_activation = true;  ///< shorter activation distances near goals and in narrow places, among static obstacles
   bool synchronous = false;      ///< planner, look-ahead and posture search run inside `step`, so that motions repeat
   std::uint64_t seed = 0;        ///< seed of all random numbers
@@ -91,6 +98,7 @@ struct ControllerSettings {
   /// Limits of Cartesian speed by the distance to obstacles. Without them only joint velocities are limited.
   std::optional<SpeedLimitSettings> speed_limits = std::nullopt;
   InputSettings inputs = {};
+  SourceSettings sources = {};
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
   std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
   /// Sub-goals where the arm is stuck without a path.
@@ -104,6 +112,7 @@ template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
 template <> const std::vector<Field<TrackingSettings>>& fields();
 template <> const std::vector<Field<InputSettings>>& fields();
+template <> const std::vector<Field<SourceSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
 
 }  // namespace sidestep

@@ -28,17 +28,28 @@ class PointTree {
     double x, y, z, radius;
   };
 
+  /// A part that moves by itself: all of a tree, or one of those that were joined.
+  struct Part {
+    int first_leaf = 0, num_leaves = 0;
+    double fastest = 0.0;  // speed of a point [m/s], at most
+  };
+
   PointTree() = default;
   /// points (3 × N) [m], radii (N) [m], velocities (3 × N) [m/s].
   PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities);
   /// The same in an order of the points that is given.
   PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
             std::vector<int> order);
+  /// One tree over the points of several, each a part; none of a node's leaves belongs to another part. Points are numbered on from
+  /// tree to tree. Sorts nothing again.
+  static PointTree join(const std::vector<const PointTree*>& trees);
 
-  int size() const noexcept { return static_cast<int>(order_.size()); }
+  int size() const noexcept { return num_points_; }
+  const std::vector<Part>& parts() const noexcept { return parts_; }
   bool moves() const noexcept { return fastest_ > 0.0; }
   double common_radius() const noexcept { return common_radius_; }  ///< [m] of all points; negative where they differ
   double fastest() const noexcept { return fastest_; }              ///< speed of any point [m/s], at most
+  /// Number of the point at each place of the tree; -1: none, which fills up a leaf.
   const std::vector<int>& order() const noexcept { return order_; }
 
   /// Coordinates [m], radii [m] and velocities [m/s] in tree order; points that fill up the last leaf lie at `padding`.
@@ -74,11 +85,12 @@ class PointTree {
     return found;
   }
 
-  /// Moves every point along its velocity and refits. No allocation.
-  void advance(double duration) noexcept;
-
-  /// Stops every point.
-  void freeze() noexcept;
+  /// Moves every point of a part along its velocity and refits. No allocation.
+  void advance(std::size_t part, double duration) noexcept;
+  /// Stops every point of a part.
+  void freeze(std::size_t part) noexcept;
+  /// Moves every point of a part out of every reach, for good. No allocation.
+  void hide(std::size_t part) noexcept;
 
   /// Measures of up to `fan_out` nodes.
   using Bounds = std::array<float, fan_out>;
@@ -96,7 +108,7 @@ class PointTree {
     }
   }
   /// Number of points of a leaf.
-  int count(int leaf) const noexcept { return std::min(leaf_size, size() - leaf * leaf_size); }
+  int count(int leaf) const noexcept { return counts_[static_cast<std::size_t>(leaf)]; }
 
  private:
   /// The balls and boxes of all nodes, around the same centres, with space to read whole groups of `fan_out` nodes.
@@ -127,8 +139,12 @@ class PointTree {
     return top;
   }
 
-  void refit() noexcept;
+  /// Makes the levels above `num_leaves` leaves, and fits them.
+  void build(std::size_t num_leaves);
+  /// Fits the leaves of a part, and all nodes above them.
+  void refit(const Part& part) noexcept;
   void fit(std::size_t level, int node) noexcept;
+  void find_fastest() noexcept;
 
   template <class Measure, class Leaves>
   void descend(std::size_t level, int first, int count, Measure& measure, Leaves& leaves) const noexcept {
@@ -192,9 +208,13 @@ class PointTree {
     }
   }
 
+  static constexpr std::size_t num_columns = 7;
+  int num_points_ = 0;
   std::vector<int> order_;
-  std::array<std::vector<double>, 7> columns_;  // Columns x, y, z, radius, velocity.
-  std::vector<Level> levels_;                   // Levels of the tree: leaves first, one node last.
+  std::vector<int> counts_;  // Number of points of each leaf.
+  std::vector<Part> parts_;
+  std::array<std::vector<double>, num_columns> columns_;  // Columns x, y, z, radius, velocity.
+  std::vector<Level> levels_;                             // Levels of the tree: leaves first, one node last.
   double fastest_ = 0.0, common_radius_ = -1.0;
 };
 

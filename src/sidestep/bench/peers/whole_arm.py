@@ -46,7 +46,7 @@ class ArmAmongBalls:
             ControllerSettings(planner=None, look_ahead=None, synchronous=True, output="acceleration"),
         )
         controller.set_goal(goal)
-        controller.set_obstacles(obstacles)
+        controller.set_obstacles(obstacles, valid_for=np.inf)
         run = integrate(controller, start, 0.0 * start, steps=MOTION)
         states = [(q, v, q) for q, v in zip(run.q, run.v, strict=True)]
         return cls(robot, body, controller, obstacles, start, goal, states)

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <limits>
+#include <string>
+
+namespace sidestep {
+
+/// Where a set of obstacles comes from, and how long it may be believed.
+struct SourceOptions {
+  static constexpr double untold = std::numeric_limits<double>::quiet_NaN();
+  static constexpr const char* scene = "scene";
+
+  std::string source = scene;  ///< name; a set replaces only what the same source said before
+  double time = untold;        ///< when it was captured [s], on the clock of Controller::step; NaN: when the next step takes it
+  /// Age up to which it is believed [s]; inf: for ever; NaN: SourceSettings::valid_for where it was given a time or has velocities, or
+  /// where such sets came three times within that; else ControllerSettings::obstacle_timeout.
+  double valid_for = untold;
+};
+
+/// What a controller believes of a source.
+struct SourceState {
+  std::string name;
+  int size = 0;             ///< number of points
+  double age = 0.0;         ///< time since what is believed was captured [s]
+  double valid_for = 0.0;   ///< age up to which it is believed [s]
+  bool is_overdue = false;  ///< older than that: the arm stops until it comes again
+  bool is_emptied = false;  ///< newer sets are empty, and not believed yet
+};
+
+}  // namespace sidestep

@@ -1,0 +1,252 @@
+#include "source_registry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+constexpr std::size_t longest_source_name = 100;  // Length of a source's name, at most.
+
+std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
+void check(const SourceOptions& options) {
+  if (options.source.empty() || options.source.size() > longest_source_name) {
+    throw std::invalid_argument("obstacles: the source's name is " + quoted(options.source) +
+                                ", allowed: 1 to 100 characters, such as 'camera'");
+  }
+  if (std::isinf(options.time)) {
+    throw std::invalid_argument("obstacles: time of source " + quoted(options.source) +
+                                " is infinite, allowed: seconds on the clock of step");
+  }
+  if (!std::isnan(options.valid_for) && !(options.valid_for > 0.0)) {
+    throw std::invalid_argument("obstacles: valid_for of source " + quoted(options.source) + " is " +
+                                std::to_string(options.valid_for) + " s, allowed: above 0, inf for ever");
+  }
+}
+
+/// Whether two sets say the same: a scene that is set again and again, and rests.
+bool are_same(const Obstacles& a, const Obstacles& b) {
+  return a.size() == b.size() && a.points() == b.points() && a.radii() == b.radii();
+}
+
+/// Points by the names of what they belong to.
+class Groups {
+ public:
+  struct One {
+    std::string name;
+    Eigen::Isometry3d pose;
+    Eigen::Matrix3Xd points, velocities;
+    Eigen::VectorXd radii;
+  };
+
+  void add(const Obstacles& obstacles) {
+    Eigen::Index at = 0;
+    std::size_t k = 0;
+    for (const auto& [name, count] : obstacles.groups()) {
+      all_.push_back({name, obstacles.pose_of(k++), obstacles.points().middleCols(at, count),
+                      obstacles.velocities().middleCols(at, count), obstacles.radii().segment(at, count)});
+      at += count;
+    }
+  }
+  const One* find(const std::string& name) const {
+    const auto found = std::find_if(all_.begin(), all_.end(), [&](const One& one) { return one.name == name; });
+    return name.empty() || found == all_.end() ? nullptr : &*found;
+  }
+  One& at(const std::string& name, const std::string& source) {
+    if (const One* const found = find(name)) {
+      return all_[static_cast<std::size_t>(found - all_.data())];
+    }
+    std::string names;
+    for (const One& one : all_) {
+      names += one.name.empty() ? "" : (names.empty() ? "" : ", ") + quoted(one.name);
+    }
+    throw std::invalid_argument("obstacles: source " + quoted(source) + " has no " + quoted(name) + ", it has " +
+                                (names.empty() ? "none with a name" : names));
+  }
+  void remove(const std::string& name, const std::string& source) {
+    const One* const found = &at(name, source);
+    all_.erase(all_.begin() + (found - all_.data()));
+  }
+  Obstacles obstacles() const {
+    Eigen::Index num = 0;
+    for (const One& one : all_) {
+      num += one.points.cols();
+    }
+    if (num == 0) {
+      return Obstacles::none();
+    }
+    Eigen::Matrix3Xd points(3, num), velocities(3, num);
+    Eigen::VectorXd radii(num);
+    std::vector<std::string> names;
+    std::vector<Eigen::Index> counts;
+    std::vector<Eigen::Isometry3d> poses;
+    Eigen::Index at = 0;
+    for (const One& one : all_) {
+      const Eigen::Index count = one.points.cols();
+      points.middleCols(at, count) = one.points;
+      velocities.middleCols(at, count) = one.velocities;
+      radii.segment(at, count) = one.radii;
+      names.push_back(one.name);
+      counts.push_back(count);
+      poses.push_back(one.pose);
+      at += count;
+    }
+    return Obstacles(std::move(points), std::move(radii), std::move(velocities))
+        .named(std::move(names), counts, std::move(poses));
+  }
+
+ private:
+  std::vector<One> all_;
+};
+
+}  // namespace
+
+SourceRegistry::SourceRegistry(const ControllerSettings& settings) : settings_(settings) {}
+
+SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept {
+  const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.set.name == source; });
+  return found == entries_.end() ? nullptr : &*found;
+}
+
+SourceRegistry::Entry& SourceRegistry::at(const std::string& source) {
+  if (Entry* const entry = find(source)) {
+    return *entry;
+  }
+  std::string names;
+  for (const Entry& entry : entries_) {
+    names += (names.empty() ? "" : ", ") + quoted(entry.set.name);
+  }
+  throw std::invalid_argument("obstacles: there is no source " + quoted(source) + ", there " +
+                              (names.empty() ? "is none: nothing was set" : "are: " + names));
+}
+
+SourceRegistry::Entry& SourceRegistry::at_or_new(const std::string& source) {
+  if (Entry* const entry = find(source)) {
+    return *entry;
+  }
+  if (entries_.size() == most_sources) {
+    throw std::invalid_argument("obstacles: source " + quoted(source) + " would be number " + std::to_string(most_sources + 1) +
+                                ", allowed: " + std::to_string(most_sources) +
+                                " sources; remove_obstacles(source) forgets one");
+  }
+  Entry& entry = entries_.emplace_back();
+  entry.set.name = source;
+  entry.set.id = ++last_id_;
+  entry.set.points = std::make_shared<const Obstacles>(Obstacles::none());
+  entry.set.valid_for = settings_.obstacle_timeout;
+  return entry;
+}
+
+void SourceRegistry::note(Entry& entry, double time) const noexcept {
+  entry.comes = entry.comes || (entry.last_but_one < entry.last && entry.last < time &&
+                                time - entry.last_but_one <= settings_.sources.valid_for);
+  entry.last_but_one = entry.last;
+  entry.last = time;
+}
+
+double SourceRegistry::validity(const Entry& entry, const SourceOptions& options) const noexcept {
+  if (!std::isnan(options.valid_for)) {
+    return options.valid_for;
+  }
+  const bool ages = !std::isnan(options.time) || entry.comes || entry.set.points->tree().moves();
+  return ages && std::isinf(settings_.obstacle_timeout) ? settings_.sources.valid_for : settings_.obstacle_timeout;
+}
+
+void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, double now) {
+  check(options);
+  Entry& entry = at_or_new(options.source);
+  const double time = std::isnan(options.time) ? now : options.time;
+  const Obstacles& before = *entry.set.points;
+  if (obstacles.tree().moves() && time > entry.last && are_same(before, obstacles) &&
+      before.velocities() == obstacles.velocities()) {
+    entry.set.repeated = true;  // old points with a new time: what moves is not where it was
+    ++number_;
+    return;
+  }
+  if (options.source != SourceOptions::scene || !are_same(before, obstacles)) {  // a scene that is set again and again may rest
+    note(entry, time);
+  }
+  const bool believed = obstacles.size() > 0 || before.size() == 0 ||
+                        (entry.set.emptied && time - entry.emptied_at >= settings_.sources.empty_after);
+  if (believed) {
+    replace(entry, std::move(obstacles), options);
+    return;
+  }
+  if (!std::exchange(entry.set.emptied, true)) {
+    entry.emptied_at = time;
+  }
+  entry.set.heard = options.time;
+  entry.set.heard_number = ++number_;
+}
+
+void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOptions& options) {
+  entry.set.points = std::make_shared<const Obstacles>(std::move(obstacles));
+  entry.set.number = entry.set.heard_number = ++number_;
+  entry.set.time = entry.set.heard = options.time;
+  entry.set.emptied = entry.set.repeated = false;
+  entry.set.valid_for = validity(entry, options);
+}
+
+void SourceRegistry::add(const Obstacles& obstacles, const std::string& source) {
+  check({.source = source});
+  Groups groups;
+  if (const Entry* const entry = find(source)) {
+    groups.add(*entry->set.points);
+  }
+  for (const auto& [name, count] : obstacles.groups()) {
+    if (name.empty()) {
+      throw std::invalid_argument("add_obstacle: it has no name, allowed: a name by which it is moved and removed");
+    }
+    if (groups.find(name) != nullptr) {
+      throw std::invalid_argument("add_obstacle: source " + quoted(source) + " has " + quoted(name) +
+                                  " already; move_obstacle moves it, remove_obstacle removes it");
+    }
+  }
+  groups.add(obstacles);
+  Entry& entry = at_or_new(source);
+  const double time = entry.set.time, valid_for = entry.set.valid_for;
+  replace(entry, groups.obstacles(), {source, time, valid_for});
+}
+
+void SourceRegistry::move(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options, double now) {
+  check(options);
+  Entry& entry = at(options.source);
+  Groups groups;
+  groups.add(*entry.set.points);
+  Groups::One& moved = groups.at(name, options.source);
+  const Eigen::Isometry3d step = pose * moved.pose.inverse();
+  moved.points = (step.linear() * moved.points).colwise() + step.translation();
+  moved.velocities.setZero();
+  moved.pose = pose;
+  note(entry, std::isnan(options.time) ? now : options.time);
+  replace(entry, groups.obstacles(), options);
+}
+
+void SourceRegistry::remove(const std::string& name, const std::string& source) {
+  Entry& entry = at(source);
+  Groups groups;
+  groups.add(*entry.set.points);
+  groups.remove(name, source);
+  replace(entry, groups.obstacles(), {source, entry.set.time, entry.set.valid_for});
+}
+
+void SourceRegistry::remove(const std::string& source) {
+  const Entry* const entry = &at(source);
+  entries_.erase(entries_.begin() + (entry - entries_.data()));
+  ++number_;
+}
+
+World SourceRegistry::world() const {
+  World world;
+  world.number = number_;
+  for (const Entry& entry : entries_) {
+    world.sources.push_back(entry.set);
+  }
+  world.obstacles = join(world.sources);
+  return world;
+}
+
+}  // namespace sidestep

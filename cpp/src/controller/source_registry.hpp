@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sidestep/controller/settings.hpp"
+#include "sidestep/controller/source.hpp"
+#include "world.hpp"
+
+namespace sidestep {
+
+/// The obstacles that were set, source by source. For the threads that set them, one at a time; `now` is the time of a call on the
+/// controller's clock [s].
+class SourceRegistry {
+ public:
+  explicit SourceRegistry(const ControllerSettings& settings);
+
+  // Each of these throws std::invalid_argument that names the value and what is allowed; then nothing changes.
+
+  /// Replaces what a source said. An empty set after one with points is not believed at once, see SourceSettings::empty_after.
+  void set(Obstacles obstacles, const SourceOptions& options, double now);
+  /// Forgets a source.
+  void remove(const std::string& source);
+  /// Adds named groups that a source does not have, or that are its first.
+  void add(const Obstacles& obstacles, const std::string& source);
+  /// Moves a named group to another pose in the world, see Obstacles::named: a set like those of `set`.
+  void move(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options, double now);
+  /// Removes a named group. Where it was the last one the source is empty, which is believed.
+  void remove(const std::string& name, const std::string& source);
+
+  /// All sources, as a step takes them.
+  World world() const;
+  std::uint64_t number() const noexcept { return number_; }
+
+ private:
+  struct Entry {
+    SourceSet set;
+    double last = -1e300, last_but_one = -1e300;  // Times of the last two sets [s].
+    double emptied_at = 0.0;                      // [s]
+    bool comes = false;                           // Sets come again and again.
+  };
+
+  Entry* find(const std::string& source) noexcept;
+  Entry& at(const std::string& source);
+  Entry& at_or_new(const std::string& source);
+  /// Notes that a source was set at a time [s].
+  void note(Entry& entry, double time) const noexcept;
+  /// Puts other points, which are believed at once.
+  void replace(Entry& entry, Obstacles obstacles, const SourceOptions& options);
+  double validity(const Entry& entry, const SourceOptions& options) const noexcept;
+
+  const ControllerSettings& settings_;
+  std::vector<Entry> entries_;
+  std::uint64_t number_ = 0, last_id_ = 0;
+};
+
+}  // namespace sidestep
