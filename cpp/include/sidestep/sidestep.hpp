@@ -6,3 +6,4 @@
 #include "sidestep/controller/real_time.hpp"
 #include "sidestep/arm/arm.hpp"
 #include "sidestep/scene/obstacles.hpp"
+#include "sidestep/scene/velocity_estimate.hpp"

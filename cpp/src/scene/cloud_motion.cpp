@@ -1,0 +1,337 @@
+#include "cloud_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+constexpr double longest_pause = 0.5;     // Time between sets after which earlier ones say nothing [s].
+constexpr double longest_history = 0.51;  // Time over which sets are compared [s]: six sets at 10 Hz.
+constexpr double remembered_rest = 0.35;  // Time for which a place counts as occupied after it was last seen [s].
+constexpr double background_age = 0.4;    // Time after which what rests is background [s].
+constexpr int background_sets = 5;        // Number of sets in which it must have been seen.
+constexpr double rested_age = 0.18;       // Time after which what rests makes clusters apart from what is new [s].
+constexpr int rested_sets = 4;            // Number of sets in which it must have been seen.
+constexpr double certain_age = 1.0;       // Time of rest after which there is no uncertainty left [s].
+constexpr Eigen::Index sample_size = 60;  // Number of points of a cluster that are registered.
+constexpr double least_error = 0.0003;    // Least error of a registration [m]: rounding of sensors' formats.
+constexpr double sure = 3.0;              // Standard deviations within which a shift is noise [-].
+constexpr double learned = 0.15;          // Share of one set in the noise that is learned [-].
+constexpr double lag = 3.0;               // Ratio of a displacement to what two steps of a registration from rest find of it.
+constexpr double least_way = 0.002;       // Displacement that is never excluded at first [m].
+constexpr double slowest = 0.02;          // Least speed that is found [m/s]; slower is for margins.
+constexpr double sphere = 4.0;  // Radius that holds an error in space, in standard deviations: 2.8 for 95 %, and more since
+                                // registrations share errors.
+constexpr double large_noise = 0.015;   // Noise of places beyond which a motion is likely [m].
+constexpr double slip = 0.1;            // Relative error of a velocity where other points of a surface are seen each time [-].
+constexpr double other_points = 0.002;  // Error of a registration from which on that is so [m].
+constexpr double same_scatter = 4.0;    // Ratio of scatters about a long and a short line beyond which the long one is wrong.
+constexpr double least_spacing = 0.02;  // Time in which the same points again say nothing, not even that they rest [s].
+constexpr std::size_t least_split = 5;  // Number of connected points that are taken out of a cluster that rests, at least.
+constexpr double split_distance = 0.008;   // Distance from the oldest set that noise explains [m].
+constexpr double held = 1.5;               // Spacings of the sets for which the same points again say nothing new [-].
+constexpr std::size_t few_clusters = 300;  // Number of clusters up to which every pair is compared.
+constexpr std::size_t stray_points = 3;    // Number of points of a cluster that can be noise of the background, at most.
+
+/// How much wider an error is if its deviation was found from `num` positions [-].
+double few_positions(int num) { return num == 3 ? 2.5 : num == 4 ? 1.5 : 1.2; }
+
+bool is_background(const RestMemory::Rest& rest) { return rest.age >= background_age && rest.sets >= background_sets; }
+
+/// Uncertainty of what rests within `distance` [m] for some time [s].
+double drift(double distance, double age) { return age >= certain_age ? 0.0 : distance / age; }
+
+}  // namespace
+
+void CloudMotion::forget() {
+  sets_.clear();
+  memory_.forget();
+  noise_ = 0.0;
+}
+
+bool CloudMotion::is_repeated(const Eigen::Matrix3Xd& points, double time) const {
+  if (sets_.empty() || points.cols() != sets_[0].points.cols() || points != sets_[0].points) {
+    return false;
+  }
+  const auto moves = [](const PointMotion& motion) { return !motion.velocity.isZero(0.0); };
+  const bool any = sets_.size() > 1 && std::any_of(sets_[0].motions.begin(), sets_[0].motions.end(), moves);
+  return time - sets_[0].time <= (any ? held * (sets_[0].time - sets_[1].time) : least_spacing);
+}
+
+std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, double time) {
+  if (!sets_.empty() && time - sets_[0].time > longest_pause) {
+    sets_.clear();
+  }
+  if (is_repeated(points, time)) {
+    return sets_[0].motions;
+  }
+  const auto num = static_cast<std::size_t>(points.cols());
+  const double spacing = sets_.empty() ? 0.0 : time - sets_[0].time;
+  memory_.begin(time, std::max(remembered_rest, 3.0 * spacing), num);
+  std::vector<RestMemory::Rest> rests(num);
+  std::vector<char> is_old(num), is_new(num);
+  for (std::size_t n = 0; n < num; ++n) {
+    rests[n] = memory_.at(points.col(static_cast<Eigen::Index>(n)));
+    is_new[n] = rests[n].age < rested_age || rests[n].sets < rested_sets;
+    is_old[n] = is_background(rests[n]);
+  }
+  Set set{time, points, PointGrid(points), {}, {}};
+  add_clusters(set, is_old, is_new);
+  const bool few = set.clusters.size() <= few_clusters && (sets_.empty() || sets_[0].clusters.size() <= few_clusters);
+  for (Cluster& cluster : set.clusters) {
+    judge(cluster, time, few);
+  }
+  learn_noise(set);
+  split(set);
+  spread_out(set, rests);
+  sets_.push_front(std::move(set));
+  if (sets_.size() >= most_sets) {
+    sets_.pop_back();
+  }
+  return sets_[0].motions;
+}
+
+void CloudMotion::add_clusters(Set& set, const std::vector<char>& is_old, const std::vector<char>& is_new) {
+  std::vector<char> left_out(is_old.size());
+  for (const bool newly : {true, false}) {
+    for (std::size_t n = 0; n < left_out.size(); ++n) {
+      left_out[n] = is_old[n] != 0 || (is_new[n] != 0) != newly;
+    }
+    for (std::vector<int>& members : set.grid.clusters(left_out)) {
+      add_cluster(set, std::move(members));
+    }
+  }
+}
+
+void CloudMotion::add_cluster(Set& set, std::vector<int> points) {
+  Cluster cluster;
+  cluster.points = std::move(points);
+  const auto count = static_cast<Eigen::Index>(cluster.points.size());
+  const Eigen::Matrix3Xd all = set.points(Eigen::all, cluster.points);
+  cluster.middle = all.rowwise().mean();
+  cluster.size = all.rowwise().maxCoeff() - all.rowwise().minCoeff();
+  const Eigen::Index kept = std::min(count, sample_size);
+  cluster.sample.resize(3, kept);
+  for (Eigen::Index k = 0; k < kept; ++k) {
+    cluster.sample.col(k) = all.col(k * count / kept);
+  }
+  set.clusters.push_back(std::move(cluster));
+}
+
+void CloudMotion::split(Set& set) const {
+  std::vector<char> is_explained(static_cast<std::size_t>(set.points.cols()), 1);
+  for (Cluster& cluster : set.clusters) {
+    if (sets_.empty() || cluster.motion.sets < 2 || !cluster.motion.velocity.isZero(0.0) ||
+        cluster.points.size() < 2 * least_split) {
+      continue;
+    }
+    std::vector<double> distances;
+    for (const int n : cluster.points) {
+      distances.push_back(sets_.back().grid.nearest(set.points.col(n)).distance);
+    }
+    std::vector<double> sorted = distances;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double limit = std::max(split_distance, 2.5 * *middle);
+    for (std::size_t k = 0; k < distances.size(); ++k) {
+      is_explained[static_cast<std::size_t>(cluster.points[k])] = distances[k] <= limit;
+    }
+  }
+  for (std::vector<int>& members : set.grid.clusters(is_explained)) {
+    if (members.size() >= least_split) {
+      add_cluster(set, std::move(members));  // later clusters have the last word on their points
+      judge(set.clusters.back(), set.time, true);
+    }
+  }
+}
+
+void CloudMotion::judge(Cluster& cluster, double time, bool among_few) const {
+  cluster.motion = {.uncertainty = largest_speed_};
+  if (sets_.empty() || is_stray(cluster) || rests(cluster, time)) {
+    return;
+  }
+  const Match found = match(cluster, time, among_few);
+  const Registration& last = found.registration;
+  const double most = largest_speed_ * (time - sets_[0].time) + sure * std::max(last.error, least_error);
+  if (last.is_known() && last.shift.norm() <= most) {
+    follow_line(cluster, found, time);
+  } else {
+    flickers(cluster, time);
+  }
+}
+
+bool CloudMotion::rests(Cluster& cluster, double time) const {
+  const std::size_t oldest = sets_.size() - 1;
+  double largest = 0.0, farthest = 0.0;
+  for (std::size_t k = 0; k <= oldest; k += std::max<std::size_t>(1, oldest)) {
+    const Registration at = register_points(cluster.sample, sets_[k].grid, Eigen::Vector3d::Zero(), 2);
+    const double error = sure * std::max(at.error, least_error);
+    if (!at.is_known() || at.shift.norm() > error) {
+      return false;
+    }
+    largest = (lag * at.shift.norm() + error + least_way) / (time - sets_[k].time);
+    farthest = std::max(farthest, at.shift.norm());
+  }
+  cluster.motion = {.uncertainty = std::min(largest_speed_, largest), .sets = static_cast<int>(sets_.size()) + 1};
+  cluster.scatter = farthest / std::sqrt(6.0);
+  return true;
+}
+
+bool CloudMotion::flickers(Cluster& cluster, double time) const {
+  for (std::size_t k = 1; k < std::min<std::size_t>(sets_.size(), 3); ++k) {
+    const Registration at = register_points(cluster.sample, sets_[k].grid, Eigen::Vector3d::Zero(), 2);
+    if (at.is_known()) {
+      const double way = lag * at.shift.norm() + sure * std::max(at.error, least_error) + RestMemory::reach;
+      cluster.motion = {.uncertainty = std::min(largest_speed_, way / (time - sets_[k].time))};
+      return true;
+    }
+  }
+  return false;
+}
+
+bool CloudMotion::is_stray(Cluster& cluster) const {
+  if (cluster.points.size() > stray_points) {
+    return false;
+  }
+  double farthest = 0.0;
+  for (Eigen::Index k = 0; k < cluster.sample.cols(); ++k) {
+    const PointGrid::Nearest nearest = sets_[0].grid.nearest(cluster.sample.col(k));
+    if (nearest.point < 0) {
+      return false;
+    }
+    const PointMotion& beside = sets_[0].motions[static_cast<std::size_t>(nearest.point)];
+    if (beside.sets < 3 || !beside.velocity.isZero(0.0)) {
+      return false;
+    }
+    farthest = std::max(farthest, nearest.distance);
+  }
+  cluster.motion = {.uncertainty = std::min(largest_speed_, farthest / background_age), .sets = 2};
+  return true;
+}
+
+CloudMotion::Match CloudMotion::match(const Cluster& cluster, double time, bool among_few) const {
+  const Set& last = sets_[0];
+  const double duration = time - last.time;
+  Match best;
+  std::vector<Eigen::Vector3d> starts;
+  for (std::size_t k = 0; among_few && k < last.clusters.size(); ++k) {
+    const Cluster& other = last.clusters[k];
+    const Eigen::Vector3d way = other.middle - cluster.middle;
+    const double differs = (other.size - cluster.size).norm();
+    const std::size_t more = std::max(other.points.size(), cluster.points.size()),
+                      less = std::min(other.points.size(), cluster.points.size());
+    if (way.norm() > largest_speed_ * duration + 0.5 * differs + PointGrid::edge || more > 4 * less ||
+        differs > 0.5 * std::max(other.size.norm(), cluster.size.norm()) + PointGrid::edge) {
+      continue;
+    }
+    starts.push_back(way);
+    if (!other.motion.velocity.isZero(0.0)) {
+      starts.push_back(-duration * other.motion.velocity);
+      best.moved = true;
+    }
+  }
+  best.registration = register_points(cluster.sample, last.grid, starts, 5);
+  return best;
+}
+
+void CloudMotion::follow_line(Cluster& cluster, const Match& match, double time) const {
+  LineFit<3>::Positions positions = LineFit<3>::Positions::Zero();
+  std::array<double, most_sets> times{};
+  positions.col(1) = match.registration.shift;
+  times[1] = sets_[0].time - time;
+  double error = std::max(match.registration.error, least_error);
+  int num = 2;
+  for (std::size_t k = 1; k < sets_.size() && time - sets_[k].time <= longest_history; ++k, ++num) {
+    times[k + 1] = sets_[k].time - time;
+    const auto at = static_cast<Eigen::Index>(k);
+    const Eigen::Vector3d ahead = LineFit<3>(positions, times, num).at(times[k + 1]);
+    const Registration then = register_points(cluster.sample, sets_[k].grid, std::vector{ahead}, 3);
+    if (!then.is_known()) {
+      break;
+    }
+    positions.col(at + 1) = then.shift;
+    error = std::max(error, then.error);
+  }
+  if (num == 2) {
+    const double way = match.registration.shift.norm() + sure * error;
+    cluster.motion = {.uncertainty = std::min(largest_speed_, way / (time - sets_[0].time)), .sets = num};
+    return;
+  }
+  const LineFit<3> newest(positions, times, 3);
+  int used = num;
+  LineFit<3> line = newest;
+  for (; used > 3; --used) {
+    line = LineFit<3>(positions, times, used);
+    if (line.scatter <= same_scatter * std::max(newest.scatter, error)) {
+      break;
+    }
+  }
+  line = used == 3 ? newest : line;
+  const double deviation = line.deviation(error), speed = line.velocity.norm();
+  double off = sphere * few_positions(used) * deviation;
+  off += std::max(0.0, (line.velocity - newest.velocity).norm() - sure * newest.deviation(error));
+  off += slip * speed * std::min(1.0, error / other_points);
+  const bool is_far = speed * line.spread > sure * std::max(large_noise, noise_);
+  const bool moves = speed > slowest && is_motion(line, used, std::max(error, noise_), match.moved || is_far);
+  cluster.scatter = newest.scatter;
+  cluster.motion = {.uncertainty = std::min(largest_speed_, moves ? off : off + speed), .sets = num};
+  if (moves) {
+    cluster.motion.velocity = line.velocity * std::min(1.0, largest_speed_ / speed);
+  }
+}
+
+void CloudMotion::learn_noise(const Set& set) {
+  std::vector<std::pair<double, std::size_t>> scatters;
+  std::size_t num = 0;
+  for (const Cluster& cluster : set.clusters) {
+    if (cluster.scatter >= 0.0) {
+      scatters.emplace_back(cluster.scatter, cluster.points.size());
+      num += cluster.points.size();
+    }
+  }
+  std::sort(scatters.begin(), scatters.end());
+  std::size_t below = 0;
+  for (const auto& [scatter, points] : scatters) {
+    below += points;
+    if (2 * below >= num) {
+      noise_ = noise_ == 0.0 ? scatter : std::hypot(std::sqrt(1.0 - learned) * noise_, std::sqrt(learned) * scatter);
+      return;
+    }
+  }
+}
+
+void CloudMotion::spread_out(Set& set, const std::vector<RestMemory::Rest>& rests) {
+  const double noise = RestMemory::reach;
+  set.motions.resize(rests.size());
+  for (std::size_t n = 0; n < rests.size(); ++n) {
+    set.motions[n] = {.uncertainty = std::min(largest_speed_, drift(noise, std::max(rests[n].age, background_age))),
+                      .sets = most_sets};
+  }
+  for (const Cluster& cluster : set.clusters) {
+    const bool is_known = cluster.motion.sets > 1, moves = !cluster.motion.velocity.isZero(0.0);
+    for (const int k : cluster.points) {
+      const auto n = static_cast<std::size_t>(k);
+      PointMotion& motion = set.motions[n];
+      motion = cluster.motion;
+      if (is_known && !moves && rests[n].sets > 0) {
+        motion.uncertainty = std::min(motion.uncertainty, drift(noise, rests[n].age));
+      } else if (is_known && !moves && cluster.points.size() > stray_points) {
+        motion = {.uncertainty = largest_speed_};  // a new part
+      }
+    }
+  }
+  for (std::size_t n = 0; n < rests.size(); ++n) {
+    if (set.motions[n].velocity.isZero(0.0)) {
+      memory_.rests(set.points.col(static_cast<Eigen::Index>(n)), set.motions[n].sets > 1);
+    }
+  }
+  for (std::size_t n = 0; n < rests.size(); ++n) {
+    if (!set.motions[n].velocity.isZero(0.0)) {
+      memory_.moves(set.points.col(static_cast<Eigen::Index>(n)));
+    }
+  }
+}
+
+}  // namespace sidestep

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <vector>
+
+#include "line_fit.hpp"
+#include "point_grid.hpp"
+#include "registration.hpp"
+#include "rest_memory.hpp"
+
+namespace sidestep {
+
+/// What is known of the motion of a point.
+struct PointMotion {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
+  double uncertainty = 0.0;                            ///< [m/s]
+  int sets = 1;                                        ///< that it was seen in
+};
+
+/// Velocities of points that have neither names nor an order, by clusters; see VelocityEstimate.
+class CloudMotion {
+ public:
+  explicit CloudMotion(double largest_speed) : largest_speed_(largest_speed) {}
+
+  /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last.
+  std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time);
+  void forget();
+
+ private:
+  /// What was connected in a set.
+  struct Cluster {
+    std::vector<int> points;
+    Eigen::Vector3d middle, size;  // centroid and edges of its box [m]
+    Eigen::Matrix3Xd sample;       // some of its points [m]
+    PointMotion motion;
+    double scatter = -1.0;  // of its places about a line [m]; negative: not known
+  };
+  struct Set {
+    double time;
+    Eigen::Matrix3Xd points;
+    PointGrid grid;
+    std::vector<Cluster> clusters;
+    std::vector<PointMotion> motions;
+  };
+  /// Where a cluster lay in the last set; whether it moved there.
+  struct Match {
+    Registration registration;
+    bool moved = false;
+  };
+
+  /// Clusters of what is new, and of what rested before but is not old; what is old rests.
+  static void add_clusters(Set& set, const std::vector<char>& is_old, const std::vector<char>& is_new);
+  static void add_cluster(Set& set, std::vector<int> points);
+  /// Takes what the oldest set does not have out of clusters that rest: a thing that moves so near to them that they are connected.
+  void split(Set& set) const;
+  bool is_repeated(const Eigen::Matrix3Xd& points, double time) const;
+  void judge(Cluster& cluster, double time, bool among_few) const;
+  /// Whether neither the last set nor the oldest one shows a shift; if so, and in the next two, sets what is known.
+  bool rests(Cluster& cluster, double time) const;
+  /// The same of one that the last set does not have, by the two sets before.
+  bool flickers(Cluster& cluster, double time) const;
+  /// Whether few points lie beside what rested for long: its noise.
+  bool is_stray(Cluster& cluster) const;
+  Match match(const Cluster& cluster, double time, bool among_few) const;
+  void follow_line(Cluster& cluster, const Match& match, double time) const;
+  void learn_noise(const Set& set);
+  void spread_out(Set& set, const std::vector<RestMemory::Rest>& rests);
+
+  double largest_speed_;
+  std::deque<Set> sets_;  // the newest first
+  RestMemory memory_;
+  double noise_ = 0.0;  // of the places of clusters from set to set [m]: sensors that shake
+};
+
+}  // namespace sidestep

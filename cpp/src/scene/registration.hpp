@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "point_grid.hpp"
+
+namespace sidestep {
+
+/// Where points lay in an earlier set: the translation that brings them there.
+struct Registration {
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< place then − place now [m]
+  double found = 0.0;                               ///< Share of the points with one of the earlier set within a cell there.
+  double cost = 1.0;   ///< Mean of squared distances, in units of a cell's; 1 for points that were not found.
+  double error = 0.0;  ///< Standard deviation of the shift per axis [m]: twice what is left of the distances tells, since the
+                       ///< nearest points are nearer than the right ones.
+  bool is_known() const noexcept { return found >= 0.6; }
+};
+
+/// Trimmed nearest-neighbour registration: from `start` on, in each of up to `iterations` steps, the shift moves on by the mean offset
+/// to the nearest points of the earlier set; what is 2.5 times farther than the median does not count. A sequence of steps that
+/// shrinks geometrically, as on smooth surfaces, is summed up. No iterations: what `start` is worth.
+Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& start,
+                             int iterations);
+
+/// The same from the best of several starts, no shift among them: rest goes first, since it needs no motion to explain what is seen.
+Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
+                             const std::vector<Eigen::Vector3d>& starts, int iterations);
+
+}  // namespace sidestep
