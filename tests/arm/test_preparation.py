@@ -22,6 +22,7 @@ def test_torque_output_asks_for_the_effort_limits_that_are_not_given() -> None:
     with pytest.raises(ValueError, match="arm 'planar2' has no effort limit of 'joint1', 'joint2'"):
         ss.Controller(arm, ControllerSettings(output="torque"))
     controller = ss.Controller(arm, ControllerSettings(output="acceleration"))
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal([0.5, 0.3])
     assert np.abs(controller.step([0, 0], [0, 0]).acceleration).max() > 0.1  # it moves
     given = ss.Arm.load(text, effort_limits={"joint1": 87, "joint2": 12})
@@ -40,6 +41,7 @@ def test_an_inertia_of_no_body_leaves_the_arm_without_dynamics() -> None:
     assert "the arm has no dynamics, so correct the <inertia>" in messages[1]
     assert not arm.has_dynamics
     controller = ss.Controller(arm)
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal([0.5, 0.3])
     assert np.abs(controller.step([0, 0], [0, 0]).acceleration).max() > 0.1  # it moves
 

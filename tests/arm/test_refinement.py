@@ -38,6 +38,7 @@ def test_a_draft_covers_every_triangle_and_the_fine_body_is_taken_over_without_a
         assert certify(triangles, ellipsoids, tolerance=1e-4).complete
 
     controller = ss.Controller(draft, ss.ControllerSettings(synchronous=True))
+    controller.set_obstacles(ss.Obstacles.none())
     goal, q, v = np.array([1.0, -1.0]), np.zeros(2), np.zeros(2)
     controller.set_goal(goal)
     refinement = Refinement(draft, controller)

@@ -422,6 +422,7 @@ def test_a_goal_at_which_links_almost_touch_is_reached() -> None:
             local_activation=lowered,
         )
         controller = ss.Controller(ss.Arm.from_robot(robot), settings)
+        controller.set_obstacles(ss.Obstacles.none())
         controller.set_goal(goal)
         motion = ss.integrate(controller, start, 0.0 * start, steps=4000)
         assert exact.minimum_over(motion.q[::20], tolerance=1e-4).distance > 0.0

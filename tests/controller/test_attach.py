@@ -163,6 +163,7 @@ def test_an_object_far_from_the_link_that_holds_it_is_doubted(recwarn):
     in_link[2, 3] = 0.12
     in_world = arm.robot.pose(Q, "fr3_hand") @ in_link
     controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, planner=None, look_ahead=None))
+    controller.set_obstacles(ss.Obstacles.none())
 
     def attach(pose, match=None):
         recwarn.clear()

@@ -75,6 +75,7 @@ def test_bad_arguments_are_named(arm: ss.Arm) -> None:
         with pytest.raises(ValueError, match=f"threads is {threads}, must be from 0 to 1024"):
             ss.integrate_batch(five, STARTS, REST, steps=1, threads=threads)
     threaded = ss.Controller(arm)
+    threaded.set_obstacles(ss.Obstacles.none())
     with pytest.raises(
         ValueError, match=r"the controller must be synchronous.*ControllerSettings\(synchronous=True\)"
     ):

@@ -53,6 +53,7 @@ def test_a_motion_repeats_bit_for_bit(robot: ss.Robot, arm: ss.Arm) -> None:
 def test_it_arrives_and_says_so(robot: ss.Robot, arm: ss.Arm) -> None:
     goal = robot.random_configuration(np.random.default_rng(0))
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(goal)
     assert controller.step(robot.neutral, np.zeros(7)).activity == ss.Activity.moving
     motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
@@ -75,6 +76,7 @@ def test_clearances_bound_commands_without_a_goal(robot: ss.Robot, arm: ss.Arm) 
 
 def test_a_goal_that_is_refused_leaves_the_one_before(robot: ss.Robot, arm: ss.Arm) -> None:
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(robot.neutral)
     controller.step(robot.neutral, np.zeros(7))
     outside = robot.neutral.copy()
@@ -123,6 +125,7 @@ def test_goals_and_trajectories_a_rounding_error_outside_end_at_the_limit(
     start[3] = robot.limits.upper[3] - 0.1
     goal[3] = robot.limits.upper[3] + 9e-4
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(goal)
     motion = ss.integrate(controller, start, np.zeros(7), steps=4000)
     assert controller.target[3] == robot.limits.upper[3]
@@ -145,6 +148,7 @@ def test_goals_and_trajectories_a_rounding_error_outside_end_at_the_limit(
 def test_a_goal_in_self_collision_is_said_to_be_so(goal: list[float], planner: bool) -> None:
     arm = ss.Arm.load("planar3")
     controller = ss.Controller(arm, settings() if planner else settings(planner=None))
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(goal)
     motion = ss.integrate(controller, arm.neutral, np.zeros(3), steps=6000)
     assert motion.activities[-1] == ss.Activity.blocked
@@ -161,6 +165,7 @@ def test_a_pose_that_has_no_posture_without_self_collision_is_said_to_be_so(plan
     pose = np.eye(4)
     pose[2, 3] = ss.Robot.named("planar3").pose(arm.neutral, "tip")[2, 3]
     controller = ss.Controller(arm, settings() if planner else settings(planner=None))
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(ss.PoseGoal(arm.robot, "tip", pose, position_only=True))
     motion = ss.integrate(controller, arm.neutral, np.zeros(3), steps=4000)
     assert motion.activities[-1] == ss.Activity.blocked
@@ -194,6 +199,7 @@ def test_a_rail_at_its_velocity_limit_is_not_stuck() -> None:
 
 def test_an_unusable_state_gives_a_stop(robot: ss.Robot, arm: ss.Arm) -> None:
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     command = controller.step(np.full(7, np.nan), np.zeros(7))
     assert command.status == ss.SafetyStatus.stopping
     assert np.isnan(command.clearance)
@@ -223,6 +229,7 @@ def test_the_status_tells_of_a_lost_clearance(robot: ss.Robot, arm: ss.Arm) -> N
 def test_a_pose_is_reached_by_a_posture_that_it_finds(robot: ss.Robot, arm: ss.Arm) -> None:
     pose = robot.pose(robot.random_configuration(np.random.default_rng(5)), "fr3_hand")
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(ss.PoseGoal(robot, "fr3_hand", pose))
     motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
     reached = robot.pose(motion.last_q, "fr3_hand")
@@ -235,6 +242,7 @@ def test_what_is_out_of_reach_is_said(robot: ss.Robot, arm: ss.Arm) -> None:
     pose = np.eye(4)
     pose[:3, 3] = 0.0, 0.0, 3.0
     controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(ss.PoseGoal(robot, "fr3_hand", pose))
     motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
     assert motion.activities[-1] == ss.Activity.blocked
@@ -267,7 +275,9 @@ def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: s
     for planner in (OnlinePlannerSettings(), None):
         controller = ss.Controller(arm, settings(planner=planner))
         controller.set_goal(goal)
-        controller.set_obstacles([ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball])
+        controller.set_obstacles(
+            [ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball], valid_for=np.inf
+        )
         motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=16000)
         assert motion.activities[-1] == ss.Activity.blocked
         assert re.match(
@@ -310,6 +320,7 @@ def test_a_posture_is_looked_for_near_the_rest_of_a_pose(robot: ss.Robot, arm: s
     for _ in range(5):
         rest = robot.random_configuration(rng)
         controller = ss.Controller(arm, settings())
+        controller.set_obstacles(ss.Obstacles.none())
         controller.set_goal(ss.PoseGoal(robot, "fr3_hand", robot.pose(rest, "fr3_hand"), rest=rest))
         controller.step(robot.neutral, np.zeros(7))
         found = controller.target
@@ -348,6 +359,7 @@ def test_continuous_joints_take_the_nearest_turn_and_survive_encoders_that_wrap(
     robot = ss.Robot.from_urdf(text)
     spinner = ss.Arm.from_robot(robot, ss.Body.cover(robot, components=2, cache=False))
     controller = ss.Controller(spinner, settings())
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal([-3.0])
     q, v, travelled = np.array([3.0]), np.zeros(1), 0.0
     for _ in range(6000):

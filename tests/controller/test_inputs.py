@@ -11,7 +11,9 @@ NV = ARM.num_coordinates
 
 
 def controller(**settings: object) -> ss.Controller:
-    return ss.Controller(ARM, ss.ControllerSettings(synchronous=True, **settings))  # type: ignore[arg-type]
+    made = ss.Controller(ARM, ss.ControllerSettings(synchronous=True, **settings))  # type: ignore[arg-type]
+    made.set_obstacles(ss.Obstacles.none())
+    return made
 
 
 def run(c: ss.Controller, steps: int) -> tuple[np.ndarray, np.ndarray, ss.controller.Command]:

@@ -45,6 +45,7 @@ def test_a_position_command_stays_within_the_limits_under_noise(output: str) -> 
     arm = ss.Arm.load("fr3")
     limits = arm.limits
     controller = ss.Controller(arm, ss.ControllerSettings(output=output, synchronous=True, planner=None))
+    controller.set_obstacles(ss.Obstacles.none())
     random = np.random.default_rng(4)
     q = arm.neutral.copy()
     q[0], q[5] = limits.upper[0], limits.lower[5]

@@ -45,9 +45,11 @@ def grid(edge: float, depth: float) -> np.ndarray:
 
 
 def controller(arm: ss.Arm, **options: object) -> ss.Controller:
-    return ss.Controller(
+    made = ss.Controller(
         arm, ss.ControllerSettings(synchronous=True, **({"output": "acceleration"} | options))
     )
+    made.set_obstacles(ss.Obstacles.none())
+    return made
 
 
 @pytest.mark.parametrize(

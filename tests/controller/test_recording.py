@@ -36,7 +36,9 @@ def arm():
 
 
 def controller_of(arm, **settings):
-    return ss.Controller(arm, ss.ControllerSettings(synchronous=True, **settings))
+    made = ss.Controller(arm, ss.ControllerSettings(synchronous=True, **settings))
+    made.set_obstacles(ss.Obstacles.none())
+    return made
 
 
 def at(x, y, z):
@@ -417,6 +419,7 @@ def test_steps_do_not_wait_for_a_slow_disk_and_what_is_lost_is_counted(arm, tmp_
     disk = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # takes nothing yet
     settings = ss.ControllerSettings(output="torque", planner=None, look_ahead=None)
     controller = ss.Controller(arm, settings)
+    controller.set_obstacles(ss.Obstacles.none())
     recording = controller.record(pipe)
     mass, bias, v = arm.mass_matrix(Q), arm.bias(Q, np.zeros(7)), np.zeros(7)
     steps = 18_000  # of 1.2 kB: more than 16 MiB

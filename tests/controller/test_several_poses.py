@@ -39,6 +39,7 @@ def goals(arm, q, sides=("left", "right")):
 
 def run(arm, goal, q, steps=6000, **settings):
     controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, **settings))
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(goal)
     v, least = np.zeros_like(q), np.inf
     for _ in range(steps):

@@ -155,3 +155,50 @@ def test_a_capture_in_the_future_is_of_another_clock(planar: ss.Arm) -> None:
     controller.set_obstacles(ss.Obstacles(FAR), source="camera", time=1.7e9)
     assert controller.step(START, np.zeros(3)).status == ss.SafetyStatus.stale
     assert "its clock is not that of step" in controller.explain()
+
+
+def test_velocities_that_nobody_told_are_found_from_a_stream_of_sets(planar: ss.Arm) -> None:
+    controller = controller_of(planar)
+    rng = np.random.default_rng(0)
+    ball = rng.normal(size=(200, 3))
+    ball = 0.1 * ball / np.linalg.norm(ball, axis=1, keepdims=True)
+    wall = np.stack([np.full(400, 2.0), *(rng.uniform(-1.0, 1.0, (2, 400)))], axis=1)
+    speed = np.array([0.0, 0.4, 0.0])
+    q, v = START, np.zeros(3)
+    for k in range(10):
+        at = np.array([3.0, -0.5, 0.5]) + speed * controller.time
+        controller.set_obstacles(
+            ss.Obstacles(np.vstack([wall, at + ball])), source="camera", time=controller.time
+        )
+        motion = ss.integrate(controller, q, v, steps=33)
+        q, v = motion.last_q, motion.last_v
+        found = controller.obstacles.velocities
+        if k == 0:
+            assert not found.any()
+    np.testing.assert_array_equal(found[:400], np.zeros((400, 3)))
+    np.testing.assert_allclose(found[400:], np.tile(speed, (200, 1)), atol=0.02)
+
+
+def test_a_named_shape_that_is_moved_has_the_velocity_of_its_motion(planar: ss.Arm) -> None:
+    controller = controller_of(planar)
+    controller.set_obstacles(ss.Box((0.2, 0.2, 0.2), pose_at([3.0, 0.0, 0.0]), name="box"), source="tracker")
+    for k in range(5):
+        ss.integrate(controller, START, np.zeros(3), steps=20)
+        controller.move_obstacle("box", pose_at([3.0, 0.01 * (k + 1), 0.0]), source="tracker")
+    controller.step(START, np.zeros(3))
+    np.testing.assert_allclose(
+        controller.obstacles.velocities, np.tile([0.0, 0.5, 0.0], (len(controller.obstacles), 1)), atol=0.01
+    )
+    ss.integrate(controller, START, np.zeros(3), steps=400)
+    assert controller.command.status == ss.SafetyStatus.stale
+    assert "source 'tracker'" in controller.explain()
+
+
+def test_old_points_with_new_times_are_no_news(planar: ss.Arm) -> None:
+    controller = controller_of(planar)
+    frozen = ss.Obstacles(FAR, velocities=[[-0.3, 0.0, 0.0]])
+    for _ in range(12):
+        controller.set_obstacles(frozen, source="tracker", time=controller.time)
+        ss.integrate(controller, START, np.zeros(3), steps=33)
+    assert controller.command.status == ss.SafetyStatus.stale
+    assert "old data with new times" in controller.explain()

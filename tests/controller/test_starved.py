@@ -31,7 +31,7 @@ def beside_a_ball(velocity=(0.0, 0.0, -0.001), **settings):
     arm = ss.Arm.load("fr3")
     controller = ss.Controller(arm, ss.ControllerSettings(output="acceleration", **settings))
     ball = ss.Sphere(0.05, pose_at([-0.25, 0.0, 0.35]), velocity=velocity)
-    controller.set_obstacles(ball)
+    controller.set_obstacles(ball, valid_for=np.inf)
     return controller
 
 

@@ -25,9 +25,11 @@ RAIL = """<robot name="rail"><link name="base"/>
 
 
 def controller(arm: ss.Arm = ARM, **settings: object) -> ss.Controller:
-    return ss.Controller(
+    made = ss.Controller(
         arm, ss.ControllerSettings(**{"synchronous": True, "output": "acceleration"} | settings)
     )
+    made.set_obstacles(ss.Obstacles.none())
+    return made
 
 
 def numbers(pattern: str, words: str) -> list[float]:

@@ -127,7 +127,7 @@ def test_what_moves_far_away_leaves_the_goal_free(make) -> None:  # type: ignore
 
     def value(away: float, speed: float) -> float:
         seen = ss.Obstacles([resting, [away, 0.0, 2.0]], 0.1, velocities=[[0.0] * 3, [0.0, 0.0, -speed]])
-        controller.set_obstacles(seen)
+        controller.set_obstacles(seen, valid_for=np.inf)
         for _ in range(5):
             controller.step(at, REST)
         return height(controller, at, alone)

@@ -8,6 +8,9 @@
 namespace sidestep {
 namespace {
 
+constexpr double no_time = SourceOptions::untold;  // Time of a set that says nothing of how often they come.
+constexpr double longest_between = 1.0;            // Time between two sets beyond which they say nothing of velocities [s].
+constexpr double least_largest_speed = 1e-3;      // Largest speed that is assumed, at least: 0 is none that can be found [m/s].
 constexpr std::size_t longest_source_name = 100;  // Length of a source's name, at most.
 
 std::string quoted(const std::string& name) { return "'" + name + "'"; }
@@ -151,7 +154,7 @@ double SourceRegistry::validity(const Entry& entry, const SourceOptions& options
   if (!std::isnan(options.valid_for)) {
     return options.valid_for;
   }
-  const bool ages = !std::isnan(options.time) || entry.comes || entry.set.points->tree().moves();
+  const bool ages = !std::isnan(options.time) || entry.comes || entry.given.tree().moves();
   return ages && std::isinf(settings_.obstacle_timeout) ? settings_.sources.valid_for : settings_.obstacle_timeout;
 }
 
@@ -159,22 +162,20 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
   check(options);
   Entry& entry = at_or_new(options.source);
   const double time = std::isnan(options.time) ? now : options.time;
-  const Obstacles& before = *entry.set.points;
-  if (obstacles.tree().moves() && time > entry.last && are_same(before, obstacles) &&
-      before.velocities() == obstacles.velocities()) {
+  const bool same = are_same(entry.given, obstacles);
+  if (same && obstacles.tree().moves() && time > entry.last && entry.given.velocities() == obstacles.velocities()) {
     entry.set.repeated = true;  // old points with a new time: what moves is not where it was
     ++number_;
     return;
   }
-  if (options.source != SourceOptions::scene || !are_same(before, obstacles)) {  // a scene that is set again and again may rest
-    note(entry, time);
-  }
-  const bool believed = obstacles.size() > 0 || before.size() == 0 ||
+  const bool believed = obstacles.size() > 0 || entry.given.size() == 0 ||
                         (entry.set.emptied && time - entry.emptied_at >= settings_.sources.empty_after);
   if (believed) {
-    replace(entry, std::move(obstacles), options);
+    const bool comes = options.source != SourceOptions::scene || !same;  // a scene that is set again and again may rest
+    replace(entry, std::move(obstacles), options, comes ? time : no_time);
     return;
   }
+  note(entry, time);
   if (!std::exchange(entry.set.emptied, true)) {
     entry.emptied_at = time;
   }
@@ -182,19 +183,42 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
   entry.set.heard_number = ++number_;
 }
 
-void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOptions& options) {
-  entry.set.points = std::make_shared<const Obstacles>(std::move(obstacles));
+void SourceRegistry::find_velocities(Entry& entry, const Obstacles& before, double last, double time) const {
+  const bool follows = time > last && time - last < longest_between;
+  if (!follows || !std::isfinite(entry.set.valid_for)) {  // the first one, or the first after a while
+    entry.motion.reset();
+    return;
+  }
+  if (!entry.motion) {
+    entry.motion.emplace(VelocityEstimate::Settings{std::max(settings_.sources.largest_speed, least_largest_speed)});
+    entry.motion->update(before, last);
+  }
+  VelocityEstimate::Result found = entry.motion->update(entry.given, time);
+  entry.set.points =
+      std::make_shared<const Obstacles>(entry.given.moving(std::move(found.velocities), std::move(found.uncertainty)));
+}
+
+void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOptions& options, double time) {
+  const Obstacles before = std::exchange(entry.given, std::move(obstacles));
+  const double last = entry.last;
+  if (!std::isnan(time)) {
+    note(entry, time);
+  }
+  entry.set.points = std::make_shared<const Obstacles>(entry.given);
   entry.set.number = entry.set.heard_number = ++number_;
   entry.set.time = entry.set.heard = options.time;
   entry.set.emptied = entry.set.repeated = false;
   entry.set.valid_for = validity(entry, options);
+  if (!std::isnan(time)) {
+    find_velocities(entry, before, last, time);
+  }
 }
 
 void SourceRegistry::add(const Obstacles& obstacles, const std::string& source) {
   check({.source = source});
   Groups groups;
   if (const Entry* const entry = find(source)) {
-    groups.add(*entry->set.points);
+    groups.add(entry->given);
   }
   for (const auto& [name, count] : obstacles.groups()) {
     if (name.empty()) {
@@ -208,29 +232,28 @@ void SourceRegistry::add(const Obstacles& obstacles, const std::string& source) 
   groups.add(obstacles);
   Entry& entry = at_or_new(source);
   const double time = entry.set.time, valid_for = entry.set.valid_for;
-  replace(entry, groups.obstacles(), {source, time, valid_for});
+  replace(entry, groups.obstacles(), {source, time, valid_for}, no_time);
 }
 
 void SourceRegistry::move(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options, double now) {
   check(options);
   Entry& entry = at(options.source);
   Groups groups;
-  groups.add(*entry.set.points);
+  groups.add(entry.given);
   Groups::One& moved = groups.at(name, options.source);
   const Eigen::Isometry3d step = pose * moved.pose.inverse();
   moved.points = (step.linear() * moved.points).colwise() + step.translation();
   moved.velocities.setZero();
   moved.pose = pose;
-  note(entry, std::isnan(options.time) ? now : options.time);
-  replace(entry, groups.obstacles(), options);
+  replace(entry, groups.obstacles(), options, std::isnan(options.time) ? now : options.time);
 }
 
 void SourceRegistry::remove(const std::string& name, const std::string& source) {
   Entry& entry = at(source);
   Groups groups;
-  groups.add(*entry.set.points);
+  groups.add(entry.given);
   groups.remove(name, source);
-  replace(entry, groups.obstacles(), {source, entry.set.time, entry.set.valid_for});
+  replace(entry, groups.obstacles(), {source, entry.set.time, entry.set.valid_for}, no_time);
 }
 
 void SourceRegistry::remove(const std::string& source) {

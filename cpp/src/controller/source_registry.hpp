@@ -2,11 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/source.hpp"
+#include "sidestep/scene/velocity_estimate.hpp"
 #include "world.hpp"
 
 namespace sidestep {
@@ -37,9 +39,11 @@ class SourceRegistry {
  private:
   struct Entry {
     SourceSet set;
+    Obstacles given = Obstacles::none();          // as they were given
     double last = -1e300, last_but_one = -1e300;  // Times of the last two sets [s].
     double emptied_at = 0.0;                      // [s]
     bool comes = false;                           // Sets come again and again.
+    std::optional<VelocityEstimate> motion;       // Velocities that nobody told, from the second set on.
   };
 
   Entry* find(const std::string& source) noexcept;
@@ -47,8 +51,10 @@ class SourceRegistry {
   Entry& at_or_new(const std::string& source);
   /// Notes that a source was set at a time [s].
   void note(Entry& entry, double time) const noexcept;
-  /// Puts other points, which are believed at once.
-  void replace(Entry& entry, Obstacles obstacles, const SourceOptions& options);
+  /// Finds velocities that nobody told from the points before, which were set at `last` [s].
+  void find_velocities(Entry& entry, const Obstacles& before, double last, double time) const;
+  /// Puts other points, which are believed at once; NaN as their time: not one of the sets that come again and again.
+  void replace(Entry& entry, Obstacles obstacles, const SourceOptions& options, double time);
   double validity(const Entry& entry, const SourceOptions& options) const noexcept;
 
   const ControllerSettings& settings_;
