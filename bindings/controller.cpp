@@ -56,6 +56,10 @@ void bind_settings_tree(nb::module_& m) {
       m, "SpeedLimitSettings",
       "Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between\n"
       "near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].");
+  bind_settings<ContactSettings>(
+      m, "ContactSettings",
+      "When a torque that neither model, load nor friction explains stops the arm: it waits for `Controller.restart`. With torque\n"
+      "output; not with `tracking.stiffness`: such an arm is made to be pushed.");
   bind_settings<InputSettings>(m, "InputSettings", "How velocities, twists and trajectories are followed, see Controller.");
   bind_settings<SourceSettings>(m, "SourceSettings", "How long obstacles are believed, see Controller.set_obstacles.");
   bind_settings<OnlinePlannerSettings>(
@@ -83,6 +87,7 @@ void bind_settings_tree(nb::module_& m) {
        part("arrival", "ArrivalSettings", &S::arrival), part("tracking", "TrackingSettings", &S::tracking),
        part("speed_limits", "SpeedLimitSettings | None", &S::speed_limits),
        part("inputs", "InputSettings", &S::inputs), part("sources", "SourceSettings", &S::sources),
+       part("contact", "ContactSettings", &S::contact),
        part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
@@ -92,6 +97,7 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("safety", &S::safety)
       .def_rw("arrival", &S::arrival)
       .def_rw("tracking", &S::tracking)
+      .def_rw("contact", &S::contact)
       .def_rw("inputs", &S::inputs)
       .def_rw("sources", &S::sources)
       .def_rw("output", &S::output)
@@ -111,6 +117,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<ArrivalSettings>(rows, "arrival.");
         describe_fields<TrackingSettings>(rows, "tracking.");
         describe_fields<SpeedLimitSettings>(rows, "speed_limits.", true);
+        describe_fields<ContactSettings>(rows, "contact.");
         describe_fields<InputSettings>(rows, "inputs.");
         describe_fields<SourceSettings>(rows, "sources.");
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
@@ -140,11 +147,13 @@ void bind_command(nb::module_& m) {
       .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its measured position: it comes to rest.")
       .value("stale", SafetyStatus::stale, "A source of obstacles is overdue, or none was ever set: the arm stops.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the quadratic program was not solved: a damped stop.")
+      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.")
+      .value("stopping", SafetyStatus::stopping, "The input is unusable, the quadratic program was not solved, or the arm feels a torque that nothing explains: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "A covering ellipsoid of the arm reaches into an obstacle, a plane or another link.");
   nb::enum_<Activity>(m, "Activity", "What a controller is doing.")
       .value("no_goal", Activity::no_goal, "No goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles.")
       .value("moving", Activity::moving, "On the way to its goal, or following a velocity, twist or trajectory.")
-      .value("waiting", Activity::waiting, "Waiting until a posture is found, or until its trajectory is free.")
+      .value("waiting", Activity::waiting, "Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`.")
       .value("arrived", Activity::arrived, "The goal is reached.")
       .value("blocked", Activity::blocked, "No path leads to the goal, for at least 0.2 s, see Controller.explain; the arm goes as near as it can.")
       .value("stale", Activity::stale, "As SafetyStatus.stale: the arm stops.");
@@ -344,8 +353,8 @@ void bind_controller(nb::module_& m) {
           "`command.delay` say how far off and how late the arm is. Raises ValueError that names sample, joint, value and what is allowed.")
       .def("clear_goal", &Controller::clear_goal, "Removes the goal: the arm comes to rest where it is, and still avoids moving obstacles.")
       .def("restart", &Controller::restart,
-           "Restarts the reference at the measured state of the next step: call it after something else has moved the arm. The goal\n"
-           "stays. Without this call the reference restarts once five measured positions in a row agree with each other but not\n"
+           "Restarts the reference at the measured state of the next step: call it after something else has moved the arm, or to go on\n"
+           "after the arm touched something. The goal stays. Without this call the reference restarts once five measured positions in a row agree with each other but not\n"
            "with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
       .def(
           "set_arm",

@@ -99,4 +99,8 @@ void DisturbanceObserver::change_model(const Eigen::VectorXd& change) noexcept {
   std::fill(joints_.begin(), joints_.end(), Joint{});
 }
 
+void DisturbanceObserver::set_disturbance(const Eigen::VectorXd& disturbance) noexcept {
+  disturbance_ = disturbance.cwiseMax(-most_disturbance_).cwiseMin(most_disturbance_);
+}
+
 }  // namespace sidestep

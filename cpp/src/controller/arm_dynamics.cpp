@@ -39,6 +39,12 @@ void ArmDynamics::observe(bool begins, const Eigen::VectorXd& v, const LastOutpu
   }
 }
 
+void ArmDynamics::hold(const Eigen::VectorXd& load) noexcept {
+  if (observer_) {
+    observer_->set_disturbance(load);
+  }
+}
+
 void ArmDynamics::update(const KinematicState& state, const ToldDynamics& told) noexcept {
   // Without inertias of its own, an arm has to be told them in every step.
   if (told.mass_matrix != nullptr) {

@@ -38,6 +38,8 @@ class ArmDynamics {
 
   /// Compares the velocity v with what the last output makes of the last one; `begins`: there is no last one.
   void observe(bool begins, const Eigen::VectorXd& v, const LastOutput& last) noexcept;
+  /// Nothing but `load` (nv) [Nm | N] acts on the arm beside the model, as far as is known: what was observed since was a touch.
+  void hold(const Eigen::VectorXd& load) noexcept;
   /// The motion begins at the velocity v: what it was before explains nothing.
   void begin_at(const Eigen::VectorXd& v) noexcept { last_v_ = v; }
   /// Writes M and h at a state, as told or by the model, with what is observed. Without either M is NaN.
@@ -54,6 +56,7 @@ class ArmDynamics {
   bool has_model() const noexcept { return model_.has_value(); }
   const Eigen::MatrixXd& mass() const noexcept { return mass_; }
   const Eigen::VectorXd& bias() const noexcept { return bias_; }
+  const Eigen::VectorXd& model_bias() const noexcept { return model_bias_; }  ///< without what is observed
   const Eigen::VectorXd& gravity() const noexcept { return gravity_; }
   const Eigen::VectorXd& gravity_change() const noexcept { return gravity_change_; }
   const std::optional<DisturbanceObserver>& observer() const noexcept { return observer_; }

@@ -21,6 +21,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
       attractor_(model.system, model.settings),
       distances_(model.system, model.clearances),
       dynamics_(model.dynamics, model.arm.robot(), model.settings, model.torque),
+      touch_(model.arm.robot(), model.joints, model.settings, model.torque && model.settings.tracking.stiffness == 0.0),
       speed_(model.body, model.settings),
       program_(within_margins(model.arm.robot(), model.settings, model.settings.speed), model.settings, model.torque),
       solution_(model.arm.num_coordinates(), model.settings.safety.max_rows),

@@ -31,6 +31,7 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   taken_.obstacles = sources_.handed_over();
   board_.guarded([&] { look_ahead_.go_on_from(before.look_ahead_); });
   dynamics_.go_on_from(before.dynamics_);
+  touch_.go_on_from(before.touch_);
   if (dynamics_.has_model() && measured_.was_known()) {
     dynamics_.change_weight(measured_.position(), measured_.velocity());
   }
@@ -46,6 +47,7 @@ bool Controller::Impl::is_lifted() const noexcept {
 void Controller::Impl::restart() noexcept {
   taken_.restarts = true;
   measured_.restart();
+  touch_.release();
 }
 
 void Controller::take_over() noexcept {

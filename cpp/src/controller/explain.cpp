@@ -65,6 +65,9 @@ std::string Controller::Impl::explain_motion() const {
   if (state_.tick == 0) {
     return "no step was made yet: call step with the measured state, once a period";
   }
+  if (touch_.is_touched() && solution_.fault == TorqueFault::none) {
+    return touch_.explain();
+  }
   if (command_.status == SafetyStatus::stopping) {
     return explain_stop(state_.program, measured_, model.plausible, solution_.fault);
   }

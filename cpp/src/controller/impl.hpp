@@ -22,6 +22,7 @@
 #include "../guard/backup_manoeuvre.hpp"
 #include "sources.hpp"
 #include "speed_limiter.hpp"
+#include "touch_judge.hpp"
 #include "tracker.hpp"
 #include "worker.hpp"
 
@@ -114,6 +115,10 @@ class Controller::Impl {
   /// The motion begins where the arm is, or the reference goes on by a period. Whether the arm is elsewhere than the reference.
   bool follow_arm() noexcept;
   void begin_motion() noexcept;
+  /// The arm touched something: it begins anew where it is, and waits.
+  void judge_touch() noexcept;
+  /// The arm stops: the obstacles are old, or it touched something.
+  bool must_rest() const noexcept { return sources_.is_stale() || touch_.is_touched(); }
   /// Activation distances, shorter where the arm is led; `looks`: it is time to look for what moves.
   void update_activation_distances(bool looks, const Obstacles& obstacles) noexcept;
   /// Out of the way of what moves, in place of what is followed; and the pace that the look-ahead leaves.
@@ -159,6 +164,7 @@ class Controller::Impl {
   AttractorStage attractor_;
   ActivationDistances distances_;
   ArmDynamics dynamics_;
+  TouchJudge touch_;
   SpeedLimiter speed_;
   JointProgram program_;
   TorqueSolution solution_;  // Solution for the reference.

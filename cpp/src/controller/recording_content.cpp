@@ -66,6 +66,7 @@ void each_part(Settings& s, Part&& part, Optional&& optional) {
   part("safety.", s.safety);
   part("arrival.", s.arrival);
   part("tracking.", s.tracking);
+  part("contact.", s.contact);
   part("inputs.", s.inputs);
   part("sources.", s.sources);
   if (optional("speed_limits", s.speed_limits)) {

@@ -39,7 +39,7 @@ void Controller::Impl::report_motion(const Goal& followed, bool apart) noexcept 
   command_.deviation = inputs_.judge_deviation(reference_);
   command_.delay = inputs_.trajectory_delay();
   report_program();
-  command_.avoiding = look_ahead_.is_followed() && !sources_.is_stale();
+  command_.avoiding = look_ahead_.is_followed() && !must_rest();
   command_.on_path = inputs_.goal().is_led_to_target() && inputs_.goal().is_on_path(&followed);
   command_.velocity = reference_.next_v;
   if (model.settings.output == ControllerSettings::Output::velocity) {
@@ -57,7 +57,7 @@ void Controller::Impl::report_stop() noexcept {
   command_.deviation = command_.delay = 0.0;
   report_program();
   command_.input_change.setZero();
-  command_.avoiding = look_ahead_.is_followed() && !sources_.is_stale();
+  command_.avoiding = look_ahead_.is_followed() && !must_rest();
   command_.on_path = false;
   command_.coordinate = command_.point = -1;
   command_.clearance = command_.distance = command_.speed = command_.speed_limit = unknown;
@@ -144,7 +144,7 @@ void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept 
   if (stale) {
     status = std::max(status, SafetyStatus::stale);
   }
-  if (is_fallback(state_.attraction)) {
+  if (is_fallback(state_.attraction) || touch_.is_touched()) {
     status = SafetyStatus::stopping;
   }
   if (command_.clearance < 0.0) {
@@ -156,10 +156,10 @@ void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept 
   if (reduced && status == SafetyStatus::ok) {
     status = SafetyStatus::limited;
   }
-  const ActivityJudge::Verdict verdict = activity_.judge({inputs_.request(), inputs_.destination(), inputs_.goal(), &followed,
-                                                          measured_, arm_state(apart), state_.attraction, state_.time, stale,
-                                                          inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
-  command_.activity = verdict.activity;
+  const ActivityJudge::Verdict verdict = activity_.judge(
+      {inputs_.request(), inputs_.destination(), inputs_.goal(), &followed, measured_, arm_state(apart), state_.attraction,
+       state_.time, must_rest(), inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
+  command_.activity = touch_.is_touched() && !stale ? Activity::waiting : verdict.activity;
   if (verdict.rests) {
     inputs_.goal().set_rests(*verdict.rests);
   }

@@ -83,6 +83,18 @@ const std::vector<Field<TrackingSettings>>& fields() {
 }
 
 template <>
+const std::vector<Field<ContactSettings>>& fields() {
+  using S = ContactSettings;
+  static const std::vector<Field<S>> all{
+      {"share", &S::share, "-", 0.02, none,
+       "largest torque that neither model, load nor friction explains, as a share of the effort limits: from there on the arm stops "
+       "and waits for restart(); smaller feels gentler touches, but untold loads and friction stop the arm too; inf: no stop"},
+      {"time", &S::time, "s", 0.0, 1.0, "time for which that torque has to last: longer ignores short knocks"},
+  };
+  return all;
+}
+
+template <>
 const std::vector<Field<InputSettings>>& fields() {
   using S = InputSettings;
   static const std::vector<Field<S>> all{
@@ -159,6 +171,7 @@ void ControllerSettings::validate() const {
   check_fields("controller: safety.", safety);
   check_fields("controller: arrival.", arrival);
   check_fields("controller: tracking.", tracking);
+  check_fields("controller: contact.", contact);
   check_fields("controller: inputs.", inputs);
   check_fields("controller: sources.", sources);
   if (!(barriers.floor < barriers.activation && barriers.floor < barriers.self_activation)) {

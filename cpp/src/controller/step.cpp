@@ -18,7 +18,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   // Measurement = observe(q, v, t)
   measured_.judge(reference_.next_q, last_.acceleration, time);
   board_.show_measured(measured_.position());
-  dynamics_.observe(measured_.begins(), measured_.velocity(), last_);
+  judge_touch();
+  dynamics_.observe(measured_.begins() || touch_.is_touched(), measured_.velocity(), last_);
   bool& apart = state_.apart = follow_arm();
 
   // Target = inputs.target(World)
@@ -41,8 +42,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   look_ahead(followed, time, obstacles);
 
   // Desired = attractor(Target, World)
-  state_.attraction =
-      attractor_.attract(lead(followed, sources_.is_stale()), reference_, obstacles, sources_.closing(), state_.wanted);
+  state_.attraction = attractor_.attract(lead(followed, must_rest()), reference_, obstacles, sources_.closing(), state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
@@ -87,12 +87,25 @@ bool Controller::Impl::follow_arm() noexcept {
   const Eigen::VectorXd &q = measured_.position(), &v = measured_.velocity();
   command_.tracking_error = begins ? 0.0 : (reference_.next_q - q).cwiseAbs().maxCoeff();
   reference_.go_on();
+  if (touch_.is_touched() && tracker_.yield(q, dynamics_.mass(), touch_.resistance(), reference_)) {
+    guard_.reset();
+  }
   tracker_.write_coupling(reference_, q, state_.coupling);
   const bool apart = reference_.q != q || reference_.v != v;
   if (apart && !begins) {
     measured_.filter_velocity(last_.acceleration);
   }
   return apart;
+}
+
+void Controller::Impl::judge_touch() noexcept {
+  const bool touches =
+      touch_.judge({measured_.position(), measured_.velocity(), measured_.begins(), measured_.bridges_sample()},
+                   {last_.torque, dynamics_.mass(), dynamics_.model_bias()});
+  if (touches) {
+    measured_.restart();
+    dynamics_.hold(touch_.explained_load());
+  }
 }
 
 void Controller::Impl::begin_motion() noexcept {
@@ -130,7 +143,7 @@ InputsStage::Moment Controller::Impl::moment(const NearReference& near) const no
           state_.time,
           look_ahead_.current_pace(),
           measured_.agrees_with_reference(),
-          sources_.is_stale(),
+          must_rest(),
           look_ahead_.is_followed()};
 }
 

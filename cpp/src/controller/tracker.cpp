@@ -61,6 +61,20 @@ void Tracker::write_coupling(const Reference& reference, const Eigen::VectorXd& 
   }
 }
 
+bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque,
+                    Reference& reference) const noexcept {
+  // By the least change of each joint's torque ω² (M e)_j that is too large, one after the other.
+  bool moved = false;
+  for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
+    const double most = torque[j] / (frequency_ * frequency_), pushes = mass.col(j).dot(reference.q - arm_q);
+    if (std::abs(pushes) > most) {
+      reference.q -= (pushes - std::copysign(most, pushes)) / mass.col(j).squaredNorm() * mass.col(j);
+      moved = true;
+    }
+  }
+  return moved;
+}
+
 double Tracker::feedback_frequency(const Reference& reference, const Arm& arm) const noexcept {
   // Under a feedback that asks for more, motors that change their torque slowly would shake: ω³ |M e| and ω² |M de/dt| keep a
   // share of the rate.

@@ -29,6 +29,11 @@ class Tracker {
   /// Writes the acceleration by which the reference gives way to an arm that cannot follow it (nv).
   void write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q, Eigen::VectorXd& coupling) const noexcept;
 
+  /// Moves the reference to where feedback pushes the arm at q (nv) by no more than `torque` (nv) [Nm | N]; M: mass matrix. False
+  /// where it is there already.
+  bool yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque,
+             Reference& reference) const noexcept;
+
   /// The arm at the moment of a step, where it is not exactly where the reference is.
   struct Arm {
     const Eigen::VectorXd& q;

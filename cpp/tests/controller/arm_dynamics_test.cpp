@@ -117,3 +117,13 @@ BOOST_AUTO_TEST_CASE(without_an_observer_nothing_is_taken_from_the_bias) {
   w.dynamics.update(w.leaning, {});
   BOOST_TEST((w.dynamics.bias() == w.bias_at(w.leaning)));
 }
+
+BOOST_AUTO_TEST_CASE(what_is_held_takes_the_place_of_what_was_observed_within_its_bound) {
+  Weighing w;
+  const Eigen::VectorXd bound = w.model.settings.tracking.observer_share * w.model.arm.robot().limits().effort;
+  w.dynamics.hold(Eigen::Vector2d(0.5, -1e6));
+  w.dynamics.update(w.leaning, {});
+  const Eigen::VectorXd held = Eigen::Vector2d(0.5, -bound[1]);
+  BOOST_TEST((w.dynamics.bias() - (w.bias_at(w.leaning) - held)).norm() < 1e-9 * bound.norm());  // rounding
+  BOOST_TEST((w.dynamics.model_bias() == w.bias_at(w.leaning)));
+}

@@ -24,6 +24,7 @@ _ROOMS = {
     "sidestep.controller": (
         "ArrivalSettings",
         "BarrierSettings",
+        "ContactSettings",
         "InputSettings",
         "LocalMinimumSettings",
         "LookAheadSettings",

@@ -35,6 +35,9 @@ class DisturbanceObserver {
   /// the previous model and are forgotten; estimates stay.
   void change_model(const Eigen::VectorXd& change) noexcept;
 
+  /// Goes on from this disturbance (nv), within its bound: another one was no error of the model.
+  void set_disturbance(const Eigen::VectorXd& disturbance) noexcept;
+
   const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }  ///< d (nv) [Nm | N]
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 

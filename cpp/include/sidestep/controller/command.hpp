@@ -19,7 +19,8 @@ enum class SafetyStatus {
   tracking_lost,   ///< the arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its
                    ///< measured position: it comes to rest
   stale,           ///< the obstacles are older than `obstacle_timeout`, or it is set and obstacles never were: the arm stops
-  stopping,        ///< the input is unusable or the quadratic program was not solved: a damped stop
+  stopping,        ///< the input is unusable, the quadratic program was not solved, or the arm feels a torque that nothing
+                   ///< explains: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
 };
 
@@ -27,7 +28,7 @@ enum class SafetyStatus {
 enum class Activity {
   no_goal,  ///< no goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles
   moving,   ///< on the way to its goal, or following a velocity, twist or trajectory
-  waiting,  ///< waiting until a posture is found, or until its trajectory is free
+  waiting,  ///< waiting until a posture is found, its trajectory is free, or after a touch for `restart`
   arrived,  ///< the goal is reached
   blocked,  ///< no path leads to the goal, for at least 0.2 s, see `explain`; the arm goes as near as it can
   stale,    ///< as SafetyStatus::stale: the arm stops

@@ -97,8 +97,8 @@ class Controller {
 
   /// The arm comes to rest where it is, and still avoids moving obstacles.
   void clear_goal();
-  /// Restarts the reference at the measured state of the next usable step: for arms that something else has moved. The goal stays,
-  /// and a trajectory continues from where its clock is. From any thread; no allocation.
+  /// Restarts the reference at the measured state of the next usable step: for arms that something else has moved, and to go on
+  /// after a touch, see ContactSettings. The goal stays, and a trajectory continues from where its clock is. From any thread; no allocation.
   ///
   /// Without this call the reference restarts once five measured positions in a row agree with each other but not with the
   /// reference, or at the first one that disagrees after more than 0.1 s without a step, by the machine's clock. Until then the reference comes to rest,

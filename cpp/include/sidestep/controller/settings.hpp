@@ -49,6 +49,13 @@ struct TrackingSettings {
   double drift_gain = 2.0;  ///< gain of output velocity: v = v_r + gain (q_r − q) [1/s]
 };
 
+/// When a torque that neither model, load nor friction explains stops the arm, see Controller. With torque output; not with
+/// `tracking.stiffness`: such an arm is made to be pushed.
+struct ContactSettings {
+  double share = 0.3;  ///< largest torque that nothing explains, as a share of the effort limits [-]; inf: no stop
+  double time = 0.01;  ///< time for which it has to last [s]
+};
+
 /// How velocities, twists and trajectories are followed, see Controller.
 struct InputSettings {
   double response = 20.0;  ///< rate k of the response to a commanded velocity v_d: acceleration k (v_d − v) [1/s]
@@ -95,6 +102,7 @@ struct ControllerSettings {
   SafetySettings safety = {};
   ArrivalSettings arrival = {};
   TrackingSettings tracking = {};
+  ContactSettings contact = {};
   /// Limits of Cartesian speed by the distance to obstacles. Without them only joint velocities are limited.
   std::optional<SpeedLimitSettings> speed_limits = std::nullopt;
   InputSettings inputs = {};
@@ -111,6 +119,7 @@ struct ControllerSettings {
 template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
 template <> const std::vector<Field<TrackingSettings>>& fields();
+template <> const std::vector<Field<ContactSettings>>& fields();
 template <> const std::vector<Field<InputSettings>>& fields();
 template <> const std::vector<Field<SourceSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
