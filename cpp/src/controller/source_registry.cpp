@@ -144,8 +144,9 @@ SourceRegistry::Entry& SourceRegistry::at_or_new(const std::string& source) {
 }
 
 void SourceRegistry::note(Entry& entry, double time) const noexcept {
-  entry.comes = entry.comes || (entry.last_but_one < entry.last && entry.last < time &&
-                                time - entry.last_but_one <= settings_.sources.valid_for);
+  const bool third = entry.last_but_one < entry.last && entry.last < time &&
+                     time - entry.last_but_one <= settings_.sources.valid_for;
+  entry.comes = third || (entry.comes && time - entry.last < longest_between);  // after a while it begins anew
   entry.last_but_one = entry.last;
   entry.last = time;
 }
