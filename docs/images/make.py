@@ -1,7 +1,7 @@
 """Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-demo, studio; in figures.py those of the concepts, in theory_figures.py those of the theory; in table.py that of the
-first screen. That of the studio needs Chromium and `pip install 'sidestep[headless]'`.
+demo, studio; in figures.py and source_figures.py those of the concepts, in theory_figures.py those of the theory; in
+table.py that of the first screen. That of the studio needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
 import argparse
@@ -42,6 +42,7 @@ def keep(source: Path, target: Path) -> None:
 MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
 FIGURES = {
     "figures": ("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),
+    "source_figures": ("believes",),
     "theory_figures": ("density", "geometry", "systems", "control", "clearances", "timed-path"),
 }
 
