@@ -5,6 +5,7 @@ import numpy as np
 import sidestep as ss
 
 controller = ss.Controller(arm := ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True))
+controller.set_obstacles(ss.Obstacles.none())  # the space is free
 q, v = arm.neutral, 0.0 * arm.neutral
 for _ in range(1000):
     controller.set_twist(

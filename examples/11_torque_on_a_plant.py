@@ -5,6 +5,7 @@ import numpy as np
 import sidestep as ss
 
 controller = ss.Controller(arm := ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True))
+controller.set_obstacles(ss.Obstacles.none())  # the space is free
 controller.set_goal(arm.neutral + 0.3)
 q, v = arm.neutral, 0.0 * arm.neutral
 while (command := controller.step(q, v)).activity != ss.Activity.arrived:

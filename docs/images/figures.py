@@ -210,7 +210,7 @@ def look_ahead() -> None:
         controller.set_goal(q)
         velocity = np.array([-0.7, 0.0, 0.0])
         begin = tip - 1.3 * velocity
-        controller.set_obstacles(ss.Obstacles([begin], radii=0.07, velocities=[velocity]))
+        controller.set_obstacles(ss.Obstacles([begin], radii=0.07, velocities=[velocity]), valid_for=np.inf)
         motion = ss.integrate(controller, q, np.zeros(7), steps=3500)
         time = np.arange(0, 3500, 10) * 1e-3
         clear = [
@@ -275,6 +275,7 @@ def guarantees() -> None:
     figure, (left, right) = sheet(2)
     limit = arm.limits.upper[0]
     controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    controller.set_obstacles(ss.Obstacles.none())
     q, v = np.array([0.0, 0.4, 0.4]), np.zeros(3)
     rows = []
     for _ in range(4000):

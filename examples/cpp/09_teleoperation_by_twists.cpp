@@ -6,12 +6,12 @@
 int main(int argc, char** argv) {
   const sidestep::Arm arm = sidestep::Arm::load(argc > 1 ? argv[1] : "fr3.arm");
   sidestep::Controller controller(arm);
+  controller.set_obstacles(sidestep::Obstacles::none());  // the space is free
   Eigen::VectorXd q = arm.neutral(), v = Eigen::VectorXd::Zero(q.size());
   const sidestep::Vector6d twist = (sidestep::Vector6d() << 0.0, 0.1, 0.0, 0.0, 0.0, 0.2).finished();  // of the world
   for (int k = 0; k < 1000; ++k) {
     controller.set_twist("fr3_hand_tcp", twist);
-    const sidestep::Command& command = controller.step(q, v);  // command.torque goes to an arm
-    q = command.position, v = command.velocity;
+    q = controller.step(q, v).position, v = controller.command().velocity;  // controller.command().torque goes to an arm
   }
   sidestep::KinematicState state(arm.robot());
   state.update(arm.robot(), q, v);

@@ -6,6 +6,7 @@
 int main(int argc, char** argv) {
   const sidestep::Arm arm = sidestep::Arm::load(argc > 1 ? argv[1] : "fr3.arm");
   sidestep::Controller controller(arm);
+  controller.set_obstacles(sidestep::Obstacles::none());  // the space is free
   Eigen::VectorXd q = arm.neutral(), v = Eigen::VectorXd::Zero(q.size());
   Eigen::MatrixXd chunk(q.size(), 2);
   chunk << q, q + Eigen::VectorXd::Constant(q.size(), 0.3);
