@@ -15,6 +15,7 @@ SOURCES = (
     "controller/explain_input.cpp",
     "controller/measured_state.cpp",
     "controller/plausibility.cpp",
+    "controller/sources.cpp",
     "controller/speed_limiter.cpp",
     "controller/trajectory_follower.cpp",
     "controller/words.cpp",
