@@ -146,8 +146,6 @@ void bind_command(nb::module_& m) {
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin or position limit can be kept; nothing is touched.")
       .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its measured position: it comes to rest.")
       .value("stale", SafetyStatus::stale, "A source of obstacles is overdue, or none was ever set: the arm stops.")
-      .value("stopping", SafetyStatus::stopping, "The input is unusable or the quadratic program was not solved: a damped stop.")
-      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable, the quadratic program was not solved, or the arm feels a torque that nothing explains: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "A covering ellipsoid of the arm reaches into an obstacle, a plane or another link.");
   nb::enum_<Activity>(m, "Activity", "What a controller is doing.")

@@ -18,7 +18,7 @@ enum class SafetyStatus {
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
   tracking_lost,   ///< the arm is farther from the command than its velocity limits cover in 0.1 s, or no motion explains its
                    ///< measured position: it comes to rest
-  stale,           ///< the obstacles are older than `obstacle_timeout`, or it is set and obstacles never were: the arm stops
+  stale,           ///< a source of obstacles is overdue, or none was ever set: the arm stops
   stopping,        ///< the input is unusable, the quadratic program was not solved, or the arm feels a torque that nothing
                    ///< explains: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
