@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sidestep.bench import (
+    After,
     DriveSettings,
     Encounter,
     EncounterJudge,
@@ -28,9 +29,10 @@ from sidestep.bench import (
     run_moving,
 )
 from sidestep.bench.drives import FREE_AT_START, random_drive
-from sidestep.bench.encounters import Course, IdealPlant, beyond_limits, load_with_meshes
+from sidestep.bench.encounters import Course, IdealPlant, load_with_meshes
+from sidestep.bench.faults import broken_promises, fault_encounter
 from sidestep.bench.motion import Motion
-from sidestep.bench.moving import FROM_ARM, EncounterMaker, MovingTask
+from sidestep.bench.moving import FROM_ARM, STANDS, EncounterMaker, MovingTask, is_kept
 from sidestep.distance import ExactClearance, SceneObject
 
 
@@ -41,24 +43,6 @@ def maker() -> EncounterMaker:
 
 def motion_of(q: np.ndarray, v: np.ndarray, a: np.ndarray, torque: np.ndarray | None = None) -> Motion:
     return Motion(q, v, a, np.zeros((len(q), 0, 7)), torque, 0, False, np.zeros(len(q)))
-
-
-def test_steps_beyond_limits_are_counted_with_the_worst_ratio() -> None:
-    limits = maker().robot.limits
-    still = np.tile(maker().robot.neutral, (5, 1))
-    v, a = np.zeros((5, 7)), np.zeros((5, 7))
-    assert beyond_limits(motion_of(still, v, a), limits) == {}
-    v[2, 1], v[3, 1] = 1.5 * limits.velocity[1], 1.1 * limits.velocity[1]
-    q = still.copy()
-    q[4, 0] = limits.upper[0] + 0.2
-    torque = np.zeros((5, 7))
-    torque[1:, 3] = 2.0 * limits.effort_rate[3] * 1e-3
-    found = beyond_limits(motion_of(q, v, a, torque), limits)
-    assert found["velocity"] == (2, pytest.approx(1.5, rel=1e-3))
-    assert found["position"] == (1, pytest.approx(0.2, abs=1e-6))
-    assert found["torque rate"] == (1, pytest.approx(2.0, rel=1e-3))
-    assert set(found) == {"velocity", "position", "torque rate"}
-    assert "position" not in beyond_limits(motion_of(q, v, a), limits, end=4)
 
 
 @pytest.mark.parametrize("holds", [True, False])
@@ -73,6 +57,45 @@ def test_an_encounter_is_the_same_whatever_is_told(holds: bool) -> None:
     clearance = ExactClearance(maker().robot, exact.objects).distance(exact.start).distance
     assert clearance > FROM_ARM
     assert np.linalg.norm(exact.objects[0].velocity) == pytest.approx(0.5)
+
+
+def test_what_fails_is_judged_in_the_same_encounter() -> None:
+    """It stands still from the fault on, or goes on; right after a set, while it is under way."""
+    exact = maker().make(MovingTask("fr3", Told.exact, 0.5, True, 3), seed=1)
+    stands, goes_on = (
+        maker().make(MovingTask("fr3", Told.dead, 0.5, True, 3, after), seed=1) for after in After
+    )
+    assert stands.fault is not None
+    assert stands.fault == goes_on.fault
+    assert exact.fault is None
+    begins = stands.fault.begins
+    assert round(begins / 1e-3) % 33 == 0
+    assert 0.1 <= 0.75 - 0.5 * begins <= 0.6 + 0.5 * 0.017  # of its 0.75 m to the link, rounded to a set
+    for encounter in (stands, goes_on):
+        np.testing.assert_array_equal(exact.start, encounter.start)
+        np.testing.assert_array_equal(exact.objects[0].pose_at(begins), encounter.objects[0].pose_at(begins))
+    later = begins + 1.0
+    np.testing.assert_array_equal(exact.objects[0].pose_at(later), goes_on.objects[0].pose_at(later))
+    np.testing.assert_array_equal(stands.objects[0].pose_at(begins), stands.objects[0].pose_at(later))
+    assert goes_on.steps == exact.steps
+    assert stands.steps >= round((begins + STANDS) / 1e-3)
+    with pytest.raises(ValueError, match="after is None and told dead"):
+        MovingTask("fr3", Told.dead, 0.5, True, 3)
+    with pytest.raises(ValueError, match="after is stands and told late"):
+        MovingTask("fr3", Told.late, 0.5, True, 3, After.stands)
+
+
+def test_robots_that_are_named_get_every_column() -> None:
+    def columns(settings: MovingSettings, robot: str) -> set[tuple[Told, After | None]]:
+        return {(task.told, task.after) for task in settings.tasks() if task.robot == robot}
+
+    every = {(told, after) for told in Told for after in (After if told.fails else (None,))}
+    assert len(every) == len(Told) + 5
+    assert columns(MovingSettings(), "fr3") == every
+    assert columns(MovingSettings(), "iiwa") == {(Told.exact, None), (Told.untold, None)}
+    assert columns(MovingSettings(robots=("iiwa",)), "iiwa") == every
+    with pytest.raises(ValueError, match="there is nothing to run"):
+        MovingSettings(robots=())
 
 
 def test_the_judge_sees_a_contact_of_an_arm_that_is_told_nothing() -> None:
@@ -118,6 +141,68 @@ def test_speed_at_the_first_contact_is_that_of_the_arm() -> None:
     assert verdict.contact_s is not None
     first = round(verdict.contact_s / 1e-3)
     assert exact.distance(q[first]).distance <= 0.0 < exact.distance(q[first - 5]).distance
+
+
+def moving_row(**values: object) -> dict[str, object]:
+    """Of an encounter without a contact."""
+    return {
+        **{"robot": "fr3", "told": "dead", "after": "goes_on", "speed": 0.5, "way_out": None, "said": None},
+        **{"clearance_m": 0.1, "self_clearance_m": 0.1, "contact_speed": None, "contact_after_fault_s": None},
+        **{"late_contact_speed": None, **values},
+    }
+
+
+def test_columns_say_what_is_promised_of_them() -> None:
+    touched = {"clearance_m": -0.01, "contact_speed": 0.2, "contact_after_fault_s": 0.123, "way_out": True}
+    cells = moving_table([moving_row(), moving_row(**touched, said="stale")])["fr3"]
+    assert cells == {
+        "dead goes_on 0.5": {
+            **{"runs": 2, "contacts": 1, "with_way_out": 1, "self_contacts": 0, "contact_speeds": [0.2]},
+            **{"late_contacts": 0, "said": 1, "contacts_after_fault_s": [0.12]},
+        }
+    }
+
+    def kept(**values: object) -> bool:
+        [(column, cell)] = moving_table([moving_row(**values)])["fr3"].items()
+        return is_kept(column, cell)
+
+    assert kept()
+    assert kept(**touched)
+    assert not kept(**touched, late_contact_speed=0.2)
+    assert not kept(**touched, after="stands")
+    assert not kept(**touched, told="exact", after=None)
+    assert kept(**touched | {"way_out": False}, told="exact", after=None)
+    assert not kept(told="exact", after=None, self_clearance_m=0.0)
+
+
+def test_limits_that_a_fault_breaks_are_named() -> None:
+    clean = {"clearance_m": 0.1, "self_clearance_m": 0.1, "before_contact": "", "case": "noise"}
+    clean |= {"beyond": {}, "beyond_free": {}, "beyond_near": {}}
+
+    def broken(**values: object) -> list[str]:
+        [(case, cell)] = fault_table([clean, clean | values]).items()
+        return broken_promises(case, cell)
+
+    assert broken() == []
+    assert broken(clearance_m=0.0) == ["contacts"]
+    assert (
+        broken(beyond={"position": (3, 0.0019), "velocity": (9, 1.2)}, beyond_near={"velocity": (9, 1.2)})
+        == []
+    )
+    assert broken(beyond={"position": (3, 0.0021)}) == ["position"]
+    assert broken(beyond={"commanded position": (1, 1e-5)}) == ["commanded position"]
+    assert broken(beyond_free={"velocity": (1, 1.04)}) == []
+    free = {"velocity": (1, 1.06), "torque rate": (1, 1.01)}
+    assert broken(beyond_free=free) == ["velocity in free space", "torque rate in free space"]
+
+
+@pytest.mark.parametrize(("case", "every", "period"), [("slow125Hz", 8, 1e-3), ("told250Hz", 4, 4e-3)])
+def test_slow_calls_are_told_or_not(case: str, every: int, period: float) -> None:
+    encounter = fault_encounter(maker(), case, 0, seed=0)
+    q = encounter.start
+    called = [k for k in range(20) if encounter.sense(k, q, q) is not None]
+    assert called == list(range(0, 20, every))
+    assert encounter.period == pytest.approx(period)
 
 
 def test_balls_of_a_drive_are_away_from_the_start() -> None:

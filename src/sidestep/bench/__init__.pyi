@@ -27,7 +27,6 @@ from .motion import ProblemRunner as ProblemRunner
 from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProblem
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .moving import MovingSettings as MovingSettings
-from .moving import Told as Told
 from .moving import moving_table as moving_table
 from .moving import run_moving as run_moving
 from .outcome import Judge as Judge
@@ -58,5 +57,7 @@ from .scenes import run_scenes as run_scenes
 from .step import StepSettings as StepSettings
 from .step import compare_steps as compare_steps
 from .step import run_step_bench as run_step_bench
+from .tracker import After as After
+from .tracker import Told as Told
 from .workspace import SweptSpace as SweptSpace
 from .workspace import Workspace as Workspace

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep import _core
-from sidestep._core import Command, Controller, ControllerSettings, JointLimits, Obstacles
+from sidestep._core import Command, Controller, ControllerSettings, Obstacles
 from sidestep.arm import Arm
+from sidestep.bench.limits_broken import Broken, count, excesses, in_free_space
 from sidestep.bench.motion import Motion, MotionSettings
 from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import poses_over
+from sidestep.bench.sensor_fault import SensorFault, fastest_contact, first_word
+from sidestep.bench.timed_calls import step_at
 from sidestep.distance import ExactClearance, SceneObject
 from sidestep.robot import Robot
 
@@ -25,7 +28,8 @@ Sense = Callable[[int, Array, Array], tuple[Array, Array] | None]
 
 PERIOD = 1e-3  # [s]
 CONTACT_STRIDE = 5  # samples between two looks for the first contact
-ROUNDING = 1e-6  # relative, and absolute below 1: how far beyond a limit counts as kept
+EXPLAIN_AFTER = 0.1  # [s] after data became too old the controller is asked what it does
+FREE_LIMITS = ("velocity", "torque rate")  # limits that may give way near obstacles alone
 
 
 def load_with_meshes(name: str) -> tuple[Arm, Robot]:
@@ -56,6 +60,8 @@ class Encounter:
         objects: the solids by which the motion is judged.
         tell: called as tell(controller, step, q) before each step: goals, obstacles.
         sense: the measured (q, v) from the true ones; None: the controller is not called in this period.
+        fault: of what tells of obstacles.
+        period: what the controller takes for the time between two steps [s].
     """
 
     index: int
@@ -66,6 +72,8 @@ class Encounter:
     sense: Sense = as_it_is
     straight_line_blocked: bool = False
     changes: tuple[float, ...] = ()
+    fault: SensorFault | None = None
+    period: float = PERIOD
 
     @property
     def goal(self) -> Array:
@@ -158,10 +166,18 @@ class TorquePlant:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What happened in an encounter: a motion, and the status of every step."""
+    """What happened in an encounter.
+
+    Attributes:
+        motion: of the arm. statuses: of every step.
+        commanded: (T, nv) positions [rad | m], nan where there was none; None: not recorded.
+        explained: what the controller said of itself after a sensor had failed.
+    """
 
     motion: Motion
     statuses: tuple[str, ...]
+    commanded: Array | None = None
+    explained: str = ""
 
 
 def run_encounter(
@@ -174,22 +190,30 @@ def run_encounter(
         plant: what carries out the commands. settings: others of `ControllerSettings`.
     """
     controller = Controller(
-        arm, ControllerSettings(output=output, synchronous=True, seed=encounter.index, **settings)
+        arm,
+        ControllerSettings(
+            output=output, synchronous=True, seed=encounter.index, period=encounter.period, **settings
+        ),
     )
-    columns: dict[str, list[Array]] = {"q": [], "v": [], "a": [], "torque": []}
+    columns: dict[str, list[Array]] = {"q": [], "v": [], "a": [], "torque": [], "commanded": []}
     statuses: list[str] = []
+    fault, explained = encounter.fault, ""
+    ask_at = None if fault is None else round((fault.begins + fault.valid_for + EXPLAIN_AFTER) / PERIOD)
     for step in range(encounter.steps):
         q, v = plant.state()
         encounter.tell(controller, step, q)
         sensed = encounter.sense(step, q, v)
         if sensed is not None or not statuses:
-            controller.step(*(sensed or (q, v)))
+            step_at(controller, *(sensed or (q, v)), step * PERIOD)
         command = controller.command
-        for name, value in zip(columns, (q, v, command.acceleration, command.torque), strict=True):
+        values = q, v, command.acceleration, command.torque, command.position
+        for name, value in zip(columns, values, strict=True):
             columns[name].append(np.array(value))
         statuses.append(command.status.name)
         if not (np.isfinite(command.acceleration).all() and np.isfinite(command.torque).all()):
             raise RuntimeError(f"step {step}: a command that is not finite")
+        if step == ask_at:
+            explained = controller.explain()
         plant.apply(command)
     rows = {name: np.array(column) for name, column in columns.items()}
     times: Array = PERIOD * np.arange(encounter.steps, dtype=np.float64)
@@ -204,7 +228,7 @@ def run_encounter(
         step_seconds=np.zeros(encounter.steps),
         safe=True,
     )
-    return Course(motion, tuple(statuses))
+    return Course(motion, tuple(statuses), rows["commanded"], explained)
 
 
 @dataclass(frozen=True)
@@ -217,8 +241,14 @@ class Verdict:
         pair: what came nearest. contact_s: time of the first contact; None without.
         contact_speed: fastest joint then [rad/s | m/s].
         way_out: a motion within the limits would have touched nothing, see `find_way_out`; None: not looked for.
-        beyond: by limit: steps beyond it before the first contact, and the worst ratio (position: [rad | m] beyond).
+        beyond: by limit: steps beyond it before the first contact, and the worst ratio (positions: [rad | m] beyond).
+        beyond_free, beyond_near: of them velocity and torque rate in free space, and nearer to something, see `FREE`.
         statuses: how often each status was told. before_contact: the status 50 ms before the first contact.
+        contact_after_fault_s: the first contact after a sensor failed; negative: before.
+        late_contact_speed: fastest joint in any contact after the arm has to stand and before data comes again, see
+            `SensorFault.stopped_by`; None: none above 0.05.
+        said, said_after_fault_s: the first status after the fault that is neither ok nor limited, and when.
+        explained: see `Course`.
     """
 
     clearance_m: float
@@ -227,9 +257,16 @@ class Verdict:
     contact_s: float | None
     contact_speed: float | None
     way_out: bool | None
-    beyond: dict[str, tuple[int, float]]
+    beyond: Broken
+    beyond_free: Broken = field(default_factory=dict)
+    beyond_near: Broken = field(default_factory=dict)
     statuses: dict[str, int] = field(default_factory=dict)
     before_contact: str = ""
+    contact_after_fault_s: float | None = None
+    late_contact_speed: float | None = None
+    said: str | None = None
+    said_after_fault_s: float | None = None
+    explained: str = ""
 
     @property
     def contact(self) -> bool:
@@ -253,16 +290,52 @@ class EncounterJudge:
         first = None
         if clearance <= 0.0:
             first = self._first_contact(encounter, motion, round(outcome.clearance_time_s / PERIOD))
-        return Verdict(
+        beyond, beyond_free, beyond_near = self._broken_limits(encounter, course, first)
+        verdict = Verdict(
             clearance_m=float(clearance),
             self_clearance_m=float(own),
             pair=outcome.clearance_pair if clearance <= own else outcome.self_pair,
             contact_s=None if first is None else first * PERIOD,
             contact_speed=None if first is None else float(np.abs(motion.v[first]).max()),
             way_out=None if outcome.way_out is None else outcome.way_out.found,
-            beyond=beyond_limits(motion, self.robot.limits, end=first),
+            beyond=beyond,
+            beyond_free=beyond_free,
+            beyond_near=beyond_near,
             statuses=dict(Counter(course.statuses)),
             before_contact="" if first is None else course.statuses[max(0, first - 50)],
+            explained=course.explained,
+        )
+        fault = encounter.fault
+        return verdict if fault is None else self._after(fault, encounter, course, verdict)
+
+    def _broken_limits(
+        self, encounter: Encounter, course: Course, end: int | None
+    ) -> tuple[Broken, Broken, Broken]:
+        """All limits broken before a step; velocity and torque rate of them in free space, and elsewhere."""
+        motion = course.motion
+        found = excesses(motion, self.robot.limits, period=encounter.period, commanded=course.commanded)
+        before = np.arange(len(motion.q)) < (len(motion.q) if end is None else end)
+        some = {name: excess for name, excess in found.items() if name in FREE_LIMITS}
+        broken = before & np.any([excess > 0.0 for excess in some.values()], axis=0)
+        free = broken.copy()
+        if encounter.objects and broken.any():
+            free = in_free_space(ExactClearance(self.robot, encounter.objects), motion, broken)
+        return count(found, where=before), count(some, where=free), count(some, where=broken & ~free)
+
+    def _after(self, fault: SensorFault, encounter: Encounter, course: Course, verdict: Verdict) -> Verdict:
+        """A verdict with what came after a sensor failed."""
+        motion, late = course.motion, None
+        if verdict.contact_s is not None:
+            exact = ExactClearance(self.robot, encounter.objects)
+            stands = fault.stopped_by(motion, self.robot.limits, PERIOD)
+            late = fastest_contact(exact, motion, stands, fault.ends, period=PERIOD, stride=CONTACT_STRIDE)
+        word = first_word(course.statuses, round(fault.begins / PERIOD) + 1)
+        return replace(
+            verdict,
+            contact_after_fault_s=None if verdict.contact_s is None else verdict.contact_s - fault.begins,
+            late_contact_speed=late,
+            said=word and word[1],
+            said_after_fault_s=word and word[0] * PERIOD - fault.begins,
         )
 
     def _first_contact(self, encounter: Encounter, motion: Motion, deepest: int) -> int:
@@ -272,32 +345,3 @@ class EncounterJudge:
             if exact.distance(motion.q[k], motion.object_poses[k]).distance <= 0.0:
                 return k
         return min(deepest, len(motion.q) - 1)
-
-
-def beyond_limits(
-    motion: Motion, limits: JointLimits, *, end: int | None = None
-) -> dict[str, tuple[int, float]]:
-    """Steps beyond each broken limit up to `end`, and the worst ratio to it; of positions the way beyond [rad | m].
-
-    Velocity is the arm's; acceleration, jerk, torque and its rate are those commanded.
-    """
-    q, v, a = motion.q[:end], motion.v[:end], motion.a[:end]
-    found: dict[str, tuple[int, float]] = {}
-
-    def put(name: str, values: Array, limit: Array) -> None:
-        excess = np.abs(values) > limit * (1.0 + ROUNDING) + ROUNDING
-        if excess.any():
-            ratio = np.nanmax(np.abs(values) / limit)
-            found[name] = (int(excess.any(axis=1).sum()), round(float(ratio), 4))
-
-    outside = np.maximum(q - limits.upper, limits.lower - q)
-    if len(q) and (outside > ROUNDING).any():
-        found["position"] = (int((outside > ROUNDING).any(axis=1).sum()), round(float(outside.max()), 6))
-    put("velocity", v, limits.velocity)
-    put("acceleration", a, limits.acceleration)
-    put("jerk", np.diff(a, axis=0) / PERIOD, limits.jerk)
-    if motion.torque is not None:
-        torque = motion.torque[:end]
-        put("torque", torque, limits.effort)
-        put("torque rate", np.diff(torque, axis=0) / PERIOD, limits.effort_rate)
-    return found

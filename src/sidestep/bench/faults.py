@@ -15,6 +15,7 @@ import numpy.typing as npt
 from sidestep._core import Controller, Obstacles
 from sidestep.bench.campaign import Row, run_campaign
 from sidestep.bench.encounters import (
+    PERIOD,
     Encounter,
     IdealPlant,
     Plant,
@@ -23,8 +24,10 @@ from sidestep.bench.encounters import (
     as_it_is,
     run_encounter,
 )
-from sidestep.bench.moving import ALL_COLUMNS, SEEN_EVERY, TWO_COLUMNS, EncounterMaker, maker_and_judge
+from sidestep.bench.limits_broken import Broken
+from sidestep.bench.moving import ALL_COLUMNS, TWO_COLUMNS, EncounterMaker, maker_and_judge
 from sidestep.bench.parallel import Progress
+from sidestep.bench.tracker import SEEN_EVERY
 from sidestep.distance import ExactClearance, SceneObject
 from sidestep.obstacles import Box, Capsule, Shape, Sphere, obstacles_from_shapes, pose_at
 from sidestep.robot import Robot
@@ -35,6 +38,9 @@ See = Callable[[np.random.Generator, Obstacles, int, Array], Obstacles]
 SOLIDS = 25
 FREE_AT_START = 0.05  # [m]
 STEPS, GOAL_EVERY = 6000, 1500  # periods
+BEYOND = ("beyond", "beyond_free", "beyond_near")  # what rows and tables say of broken limits
+MOST_BEYOND = 2e-3  # [rad | m] beyond position limits that is promised
+MOST_SPEED = 1.05  # velocity in free space that is promised, of the limit
 FREEZE = (2, 51)  # periods for which a state stands still, or a step is left out
 
 
@@ -124,8 +130,10 @@ def _measurement(case: str, rng: np.random.Generator, num: int) -> Sense:
         return delayed[0] if len(delayed) <= 3 else delayed.popleft()
 
     def slow(step: int, q: Array, v: Array) -> tuple[Array, Array] | None:
-        return (q, v) if step % 4 == 0 else None
+        return (q, v) if step % EVERY[case] == 0 else None
 
+    if case in EVERY:
+        return slow
     return {
         "noise": noise,
         "quantised": quantised,
@@ -135,11 +143,15 @@ def _measurement(case: str, rng: np.random.Generator, num: int) -> Sense:
         "spike_v": spiked_velocity,
         "nan": not_a_number,
         "late3ms": late,
-        "slow250Hz": slow,
     }[case]
 
 
-STATE = ("noise", "quantised", "frozen", "missed", "spike", "spike_v", "nan", "late3ms", "slow250Hz")
+#: Periods between two calls, of cases in which the controller is called less often; it is told its period, or not.
+EVERY = {
+    **{"slow500Hz": 2, "slow250Hz": 4, "slow125Hz": 8},
+    **{"told500Hz": 2, "told250Hz": 4, "told125Hz": 8},
+}
+STATE = ("noise", "quantised", "frozen", "missed", "spike", "spike_v", "nan", "late3ms", *EVERY)
 PLANTS = ("payload2kg", "friction", "gravity5deg", "armature")
 CASES = ("none", *SENSING, *STATE, *PLANTS)
 
@@ -251,7 +263,8 @@ def fault_encounter(maker: EncounterMaker, case: str, index: int, *, seed: int) 
 
     objects = tuple(SceneObject.from_shape(f"solid{k}", shape) for k, shape in enumerate(shapes))
     sense = _measurement(case, rng, robot.num_coordinates) if case in STATE else as_it_is
-    return Encounter(index, start, STEPS, objects, tell, sense)
+    period = PERIOD * EVERY[case] if case.startswith("told") else PERIOD
+    return Encounter(index, start, STEPS, objects, tell, sense, period=period)
 
 
 def _torque_plant(robot: Robot, start: Array, case: str) -> TorquePlant:
@@ -301,17 +314,38 @@ def _clutter(robot: Robot, rng: np.random.Generator, start: Array) -> list[Shape
 
 
 def fault_table(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
-    """By case: runs, contacts, and steps beyond limits before them with the worst ratio (position: [rad | m])."""
+    """By case: runs, contacts, and steps beyond limits before them with the worst ratio (positions: [rad | m]).
+
+    `beyond_free` and `beyond_near`: of them those in free space and near obstacles.
+    """
     table: dict[str, dict[str, Any]] = {}
     for row in rows:
         cell = table.setdefault(
-            row["case"], {"runs": 0, "contacts": 0, "silent": 0, "self_contacts": 0, "beyond": {}}
+            row["case"],
+            {"runs": 0, "contacts": 0, "silent": 0, "self_contacts": 0, **{name: {} for name in BEYOND}},
         )
         cell["runs"] += 1
         cell["contacts"] += row["clearance_m"] <= 0.0
         cell["silent"] += row["clearance_m"] <= 0.0 and row["before_contact"] in ("ok", "limited")
         cell["self_contacts"] += row["self_clearance_m"] <= 0.0
-        for name, (steps, worst) in row["beyond"].items():
-            before = cell["beyond"].get(name, (0, 0.0))
-            cell["beyond"][name] = (before[0] + steps, max(before[1], worst))
+        for beyond in BEYOND:
+            for name, (steps, worst) in row[beyond].items():
+                before = cell[beyond].get(name, (0, 0.0))
+                cell[beyond][name] = (before[0] + steps, max(before[1], worst))
     return table
+
+
+def broken_promises(case: str, cell: dict[str, Any]) -> list[str]:
+    """What of a cell of `fault_table` is not as promised: a contact, and of faults of the state also limits."""
+    broken = [name for name in ("contacts", "self_contacts") if cell[name]]
+    if case not in ("none", *STATE):
+        return broken
+    beyond, free = cell["beyond"], cell["beyond_free"]
+    broken += ["commanded position"] if "commanded position" in beyond else []
+    broken += ["position"] if _worst(beyond, "position") > MOST_BEYOND else []
+    broken += ["velocity in free space"] if _worst(free, "velocity") > MOST_SPEED else []
+    return broken + (["torque rate in free space"] if "torque rate" in free else [])
+
+
+def _worst(broken: Broken, name: str) -> float:
+    return broken[name][1] if name in broken else 0.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from enum import StrEnum
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from sidestep.bench.encounters import (
     run_encounter,
 )
 from sidestep.bench.parallel import Progress
+from sidestep.bench.tracker import LATE, LOST, OFF, SEEN_EVERY, After, Told, Tracker
 from sidestep.bench.workspace import Workspace
 from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.obstacles import Capsule, Shape, Sphere, pose_at
@@ -35,27 +35,17 @@ Array = npt.NDArray[np.float64]
 
 SPEEDS = (0.2, 0.5, 1.0)  # [m/s]
 ALL_COLUMNS = ("fr3", "ur10")  # robots with every cell
-TWO_COLUMNS = ("iiwa", "panda", "xarm7")  # robots with `Told.exact` and `Told.untold` alone
+TWO_COLUMNS = ("iiwa", "panda", "xarm7")  # robots with `Told.exact` and `Told.untold` alone, unless named
 RADII, LENGTHS = (0.04, 0.10), (0.2, 0.5)  # [m] of balls and capsules, and of capsules
 FROM_SHOULDER = 0.35  # [m] at least between the surface and the shoulder: nearer, an arm cannot yield
 FROM_ARM = 0.25  # [m] at least from the arm when it begins
 FROM_FLOOR = 0.1  # [m] its centre never is lower
 AFTER = 0.8  # [m] its way beyond the arm
-SEEN_EVERY = 33  # periods between two sets of obstacles: 30 Hz
 GOAL_EVERY = 1500  # periods between two goals of an arm that moves
-OFF = 0.3  # share by which a wrong velocity is wrong
-LATE = (0.05, 0.10)  # [s] by which positions are old
+BEFORE = (0.1, 0.6)  # [m] left of its way to the link when a tracker fails
+STANDS = 3.0  # [s] at least for which it stands there after that
 TRIES, STARTS = 500, 100  # solids drawn for a start, and starts
 APART = 0.012  # [m] of links from each other at the start
-
-
-class Told(StrEnum):
-    """What the controller is told of the velocity and of the time."""
-
-    exact = "exact"  #: position and velocity as they are
-    wrong = "wrong"  #: the velocity is 30 % off, in size or direction
-    untold = "untold"  #: no velocity
-    late = "late"  #: the position is 50 to 100 ms old, the velocity is right
 
 
 @dataclass(frozen=True)
@@ -63,14 +53,14 @@ class MovingSettings:
     """Which encounters.
 
     Attributes:
-        robots: names. told, speeds: columns; robots of `TWO_COLUMNS` have only exact and untold ones.
+        robots: names. None: all, those of `TWO_COLUMNS` with only exact and untold columns. told, speeds: columns.
         runs: in a cell. torque: in MuJoCo, else accelerations are carried out exactly. seed: of all.
 
     Raises:
         ValueError: nothing to run, or a speed that is not positive.
     """
 
-    robots: Sequence[str] = ALL_COLUMNS + TWO_COLUMNS
+    robots: Sequence[str] | None = None
     told: Sequence[Told] = tuple(Told)
     speeds: Sequence[float] = SPEEDS
     runs: int = 4
@@ -78,37 +68,54 @@ class MovingSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.runs < 1 or not self.robots or not self.told or not self.speeds:
+        named = self.robots is None or len(self.robots) > 0
+        if self.runs < 1 or not named or not self.told or not self.speeds:
             raise ValueError("there is nothing to run: robots, told, speeds and runs must not be empty")
         for speed in self.speeds:
             if not (np.isfinite(speed) and speed > 0.0):
                 raise ValueError(f"speed is {speed} m/s, must be positive and finite")
 
     def tasks(self) -> list[MovingTask]:
-        """All encounters."""
+        """All encounters, those of a tracker that fails once for each `After`."""
         return [
-            MovingTask(robot, told, speed, holds, run)
+            MovingTask(robot, told, speed, holds, run, after)
             for robot, told, speed, holds, run in itertools.product(
-                self.robots, self.told, self.speeds, (True, False), range(self.runs)
+                ALL_COLUMNS + TWO_COLUMNS if self.robots is None else self.robots,
+                self.told,
+                self.speeds,
+                (True, False),
+                range(self.runs),
             )
-            if robot not in TWO_COLUMNS or told in (Told.exact, Told.untold)
+            if self.robots is not None or robot not in TWO_COLUMNS or told in (Told.exact, Told.untold)
+            for after in (After if told.fails else (None,))
         ]
 
 
 @dataclass(frozen=True)
 class MovingTask:
-    """One encounter; holds: the arm is to stay where it is, else it gets a new goal every 1.5 s."""
+    """One encounter; holds: the arm is to stay where it is, else it gets a new goal every 1.5 s.
+
+    after: what the obstacle does when its tracker fails; None: the tracker does not fail.
+    """
 
     robot: str
     told: Told
     speed: float
     holds: bool
     run: int
+    after: After | None = None
+
+    def __post_init__(self) -> None:
+        if (self.after is not None) != self.told.fails:
+            raise ValueError(
+                f"after is {self.after} and told {self.told}, allowed: None unless a tracker fails"
+            )
 
     @property
     def name(self) -> str:
         """Unique in a campaign."""
-        return f"{self.robot} {self.told} {self.speed:g} {'holds' if self.holds else 'moves'} {self.run}"
+        name = f"{self.robot} {self.told} {self.speed:g} {'holds' if self.holds else 'moves'} {self.run}"
+        return f"{name} {self.after}" if self.after else name
 
 
 def run_moving(
@@ -147,6 +154,7 @@ class _Worker:
         return {
             "name": task.name,
             "told": task.told.value,
+            "after": task.after and task.after.value,
             **told,
             **asdict(judge.judge(encounter, course)),
         }
@@ -179,23 +187,30 @@ class EncounterMaker:
         tilt = rng.normal(size=3)
         tilt *= OFF * task.speed / np.linalg.norm(tilt)
         lag = float(rng.uniform(*LATE))
-        told_velocity = {
-            Told.wrong: off * velocity if rng.uniform() < 0.5 else velocity + tilt,
-            Told.untold: np.zeros(3),
-        }.get(task.told, velocity)
+        told_velocity = off * velocity if rng.uniform() < 0.5 else velocity + tilt
+        if task.told is not Told.wrong:
+            told_velocity = velocity if task.told.has_velocity else np.zeros(3)
+        steps = round((distance + AFTER) / task.speed / PERIOD)
+        lost = rng.uniform(size=steps // SEEN_EVERY + 1) < LOST
+        lost[0] = False
+        left = float(rng.uniform(*BEFORE))
+        fault = None
+        if task.after is not None:  # right after a set, the last that is true
+            step = SEEN_EVERY * round((distance - left) / task.speed / PERIOD / SEEN_EVERY)
+            fault = task.told.fault_at(step * PERIOD)
+            if task.after is After.stands:
+                solid = replace(solid, moves_during=(0.0, fault.begins))
+                steps = max(steps, step + round(STANDS / PERIOD))
+        tracker = Tracker(solid, task.told, told_velocity, lag, lost, fault)
 
         def tell(controller: Controller, step: int, q: Array) -> None:
             if step == 0 and task.holds:
                 controller.set_goal(start)
             if not task.holds and step % GOAL_EVERY == 0:
                 controller.set_goal(goals[step // GOAL_EVERY])
-            if step % SEEN_EVERY == 0:
-                time = step * PERIOD
-                time = max(0.0, time - lag) if task.told is Told.late else time
-                controller.set_obstacles(_shape(solid, time, told_velocity))
+            tracker.tell(controller, step)
 
-        steps = round((distance + AFTER) / task.speed / PERIOD)
-        return Encounter(task.run, start, steps, (solid,), tell)
+        return Encounter(task.run, start, steps, (solid,), tell, fault=fault)
 
     def _start(self, rng: np.random.Generator) -> Array:
         q = self.robot.neutral.copy() if rng.uniform() < 0.4 else self.configuration(rng)
@@ -257,12 +272,6 @@ def maker_and_judge(robot: str) -> tuple[EncounterMaker, EncounterJudge]:
     return EncounterMaker(arm, meshes), EncounterJudge(meshes)
 
 
-def _shape(solid: SceneObject, time: float, velocity: Array) -> Shape:
-    """As the controller is told of it."""
-    pose = solid.pose_at(time)
-    return replace(solid.shape, pose=pose, velocity=velocity, name=solid.name)  # type: ignore[type-var]
-
-
 def _random_rotation(rng: np.random.Generator) -> Array:
     """Uniform: the orthogonal factor of a random matrix, with a positive determinant."""
     rotation, upper = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -273,17 +282,43 @@ def _random_rotation(rng: np.random.Generator) -> Array:
 
 
 def moving_table(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Any]]]:
-    """By robot and "told speed": runs, contacts, those with a way out, and speeds of the arm at contact [rad/s]."""
+    """By robot and "told speed", of a tracker that fails "told after speed".
+
+    Runs, contacts, those with a way out, and speeds of the arm at contact [rad/s]. Of a tracker that fails also times
+    of contact after it failed [s], contacts later than the arm has to stand, and runs in which the status said so.
+    """
     table: dict[str, dict[str, dict[str, Any]]] = {}
     for row in rows:
+        column = " ".join(word for word in (row["told"], row["after"], f"{row['speed']:g}") if word)
         cell = table.setdefault(row["robot"], {}).setdefault(
-            f"{row['told']} {row['speed']:g}",
-            {"runs": 0, "contacts": 0, "with_way_out": 0, "self_contacts": 0, "contact_speeds": []},
+            column, {"runs": 0, "contacts": 0, "with_way_out": 0, "self_contacts": 0, "contact_speeds": []}
         )
         cell["runs"] += 1
         cell["self_contacts"] += row["self_clearance_m"] <= 0.0
-        if row["clearance_m"] <= 0.0:
+        touched = row["clearance_m"] <= 0.0
+        if touched:
             cell["contacts"] += 1
             cell["with_way_out"] += row["way_out"] is True
             cell["contact_speeds"].append(round(row["contact_speed"], 2))
+        if row["after"]:
+            for name in ("late_contacts", "said"):
+                cell.setdefault(name, 0)
+            cell.setdefault("contacts_after_fault_s", [])
+            cell["late_contacts"] += row["late_contact_speed"] is not None
+            cell["said"] += row["said"] is not None
+            if touched:
+                cell["contacts_after_fault_s"].append(round(row["contact_after_fault_s"], 2))
     return table
+
+
+def is_kept(column: str, cell: dict[str, Any]) -> bool:
+    """Whether a cell of `moving_table` is as promised.
+
+    No contact with a way out; none at all where the obstacle stands when its tracker fails; where it goes on, none with
+    an arm that moves later than it has to stand.
+    """
+    if cell["self_contacts"]:
+        return False
+    if "late_contacts" not in cell:
+        return bool(cell["with_way_out"] == 0)
+    return bool(cell["contacts" if f" {After.stands} " in column else "late_contacts"] == 0)
