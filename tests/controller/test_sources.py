@@ -182,14 +182,16 @@ def test_velocities_that_nobody_told_are_found_from_a_stream_of_sets(planar: ss.
 def test_a_named_shape_that_is_moved_has_the_velocity_of_its_motion(planar: ss.Arm) -> None:
     controller = controller_of(planar)
     controller.set_obstacles(ss.Box((0.2, 0.2, 0.2), pose_at([3.0, 0.0, 0.0]), name="box"), source="tracker")
+    q, v = START, np.zeros(3)
     for k in range(5):
-        ss.integrate(controller, START, np.zeros(3), steps=20)
+        motion = ss.integrate(controller, q, v, steps=20)
+        q, v = motion.last_q, motion.last_v
         controller.move_obstacle("box", pose_at([3.0, 0.01 * (k + 1), 0.0]), source="tracker")
-    controller.step(START, np.zeros(3))
+    motion = ss.integrate(controller, q, v, steps=1)
     np.testing.assert_allclose(
         controller.obstacles.velocities, np.tile([0.0, 0.5, 0.0], (len(controller.obstacles), 1)), atol=0.01
     )
-    ss.integrate(controller, START, np.zeros(3), steps=400)
+    ss.integrate(controller, motion.last_q, motion.last_v, steps=400)
     assert controller.command.status == ss.SafetyStatus.stale
     assert "source 'tracker'" in controller.explain()
 
@@ -197,8 +199,10 @@ def test_a_named_shape_that_is_moved_has_the_velocity_of_its_motion(planar: ss.A
 def test_old_points_with_new_times_are_no_news(planar: ss.Arm) -> None:
     controller = controller_of(planar)
     frozen = ss.Obstacles(FAR, velocities=[[-0.3, 0.0, 0.0]])
+    q, v = START, np.zeros(3)
     for _ in range(12):
         controller.set_obstacles(frozen, source="tracker", time=controller.time)
-        ss.integrate(controller, START, np.zeros(3), steps=33)
+        motion = ss.integrate(controller, q, v, steps=33)
+        q, v = motion.last_q, motion.last_v
     assert controller.command.status == ss.SafetyStatus.stale
     assert "old data with new times" in controller.explain()
