@@ -171,9 +171,9 @@ void bind_command(nb::module_& m) {
                    "(nv,) velocity of the reference after this period [rad/s | m/s].")
       .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); },
                    "(nv,) position of the reference after this period [rad | m]; nan until a state was known.")
-      .def_prop_ro("disturbance", [](const Command& c) { return to_numpy(c.disturbance); },
+      .def_prop_ro("disturbance", [](const Command& c) { return to_numpy(c.observed.disturbance); },
                    "(nv,) disturbance that the observer compensates, with torque output [Nm | N].")
-      .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
+      .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.observed.rotors); },
                    "(nv,) estimated rotor inertia that the model lacks [kg m^2 | kg].")
       .def_prop_ro("input_change", [](const Command& c) { return to_numpy(c.input_change); },
                    "(nv,) difference between the velocity of the reference after this period and the requested one [rad/s | m/s]. For a\n"
@@ -202,6 +202,12 @@ void bind_command(nb::module_& m) {
       .def_prop_ro("pace", [](const Command& c) { return c.background.pace; },
               "Share of its speed that the arm may use near moving obstacles, given the age of the look-ahead: 1 up to\n"
               "`look_ahead.slow_after` delays, then linear, 0 from `look_ahead.rest_after` delays on.")
+      .def_prop_ro("measured_period", [](const Command& c) { return c.timing.measured_period; },
+              "Period for which the step commands [s]: that of the settings, unless the last steps came more or less often.")
+      .def_prop_ro("late_steps", [](const Command& c) { return c.timing.late_steps; },
+              "Steps so far that came more than 1.5 periods of the settings after the one before.")
+      .def_prop_ro("missed_periods", [](const Command& c) { return c.timing.missed_periods; },
+              "Periods of the settings so far in which a step was missing.")
       .def("__getstate__",
            [](const Command& c) {
              nb::dict state;
@@ -260,6 +266,15 @@ void warn_of_order(const Controller& controller) {
   if (const std::string question = controller.questions().order; !question.empty()) {
     warn(question);
   }
+}
+
+/// The time that a step is told [s]; NaN: none.
+double as_time(nb::handle time) {
+  double number = std::numeric_limits<double>::quiet_NaN();
+  if (!time.is_none() && !nb::try_cast<double>(time, number)) {
+    raise_type(time, "time", "a number of seconds, or None");
+  }
+  return number;
 }
 
 /// What the thread of `step` alone may read, refused while another one has the controller.
@@ -408,26 +423,30 @@ void bind_controller(nb::module_& m) {
                    "A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.")
       .def(
           "step",
-          [](Controller& self, nb::handle q, nb::handle v, nb::handle mass_matrix, nb::handle bias) {
+          [](Controller& self, nb::handle q, nb::handle v, nb::handle mass_matrix, nb::handle bias, nb::handle time) {
             const int nv = self.num_coordinates();
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
             if (mass_matrix.is_none() != bias.is_none()) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
             }
+            const double now = as_time(time);
             const Controller::ClaimedController use(self);
-            Command command = mass_matrix.is_none() ? self.step(position, velocity)
+            Command command = mass_matrix.is_none() ? self.step(position, velocity, now)
                                                     : self.step(position, velocity, as_matrix(mass_matrix, "mass_matrix", nv, nv),
-                                                                as_vector(bias, "bias", nv));
+                                                                as_vector(bias, "bias", nv), now);
             if (self.stepped_in_turn()) {
               warn("several threads step this controller in turn: give each loop a controller of its own, or step from one thread");
             }
             return command;
           },
           nb::arg("q").none(), nb::arg("v").none(), nb::arg("mass_matrix") = nb::none(), nb::arg("bias") = nb::none(),
+          nb::kw_only(), nb::arg("time") = nb::none(),
           nb::sig("def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-                  "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
+                  "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, "
+                  "time: float | None = None) -> Command"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
-          "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
+          "[Nm | N] there. `time`: when q and v were measured, on a monotonic clock of yours [s]; without it (None or nan) the machine's\n"
+          "clock counts, and in synchronous runs exactly a period. A time that goes back gives a damped stop. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
           "while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads\n"
           "step it in turn.")
       .def(

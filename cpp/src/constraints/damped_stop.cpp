@@ -16,7 +16,7 @@ void clip_torque(const DampedStop::State& state, Eigen::Index i, TorqueSolution&
   const double effort = state.limits.effort[i];
   double lower = -effort, upper = effort;
   if (state.last_torque != nullptr) {
-    const double before = (*state.last_torque)[i], step = state.limits.effort_rate[i] * state.period;
+    const double before = (*state.last_torque)[i], step = state.limits.effort_rate[i] * state.torque_period;
     lower = std::clamp(before - step, -effort, effort);
     upper = std::clamp(before + step, -effort, effort);
   }

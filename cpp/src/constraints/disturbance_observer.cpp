@@ -24,29 +24,28 @@ constexpr double of_rotor = 1.0, of_share = 2.0, of_rest = 0.01;
 
 }  // namespace
 
-DisturbanceObserver::DisturbanceObserver(const JointLimits& limits, double period, double time, double share)
-    : period_(period),
-      share_of_period_(std::min(1.0, period / time)),
+DisturbanceObserver::DisturbanceObserver(const JointLimits& limits, double time, double share)
+    : time_(time),
       most_disturbance_(share * limits.effort),
-      most_unexpected_((leap * limits.velocity).cwiseMax(least_leap) / period),
+      most_leap_((leap * limits.velocity).cwiseMax(least_leap)),
       most_rotor_(largest * limits.effort.cwiseQuotient(limits.acceleration)),
       disturbance_(Eigen::VectorXd::Zero(limits.effort.size())),
       rotors_(disturbance_),
       acceleration_(disturbance_),
       joints_(static_cast<std::size_t>(limits.effort.size())) {}
 
-void DisturbanceObserver::identify(Eigen::Index j, const Seen& seen, const Terms& told) noexcept {
+void DisturbanceObserver::identify(Eigen::Index j, const Seen& seen, const Terms& told, double duration) noexcept {
   Joint& joint = joints_[static_cast<std::size_t>(j)];
-  const double share = std::min(1.0, period_ / filter);
+  const double share = std::min(1.0, duration / filter);
   joint.seen += share * (seen - joint.seen);
   joint.told += share * (told - joint.told);
   // At rest nothing is learnt or forgotten.
-  const double x = joint.told[0], weight = period_ * std::min(1.0, x * x), keep = std::exp(-weight / memory);
+  const double x = joint.told[0], weight = duration * std::min(1.0, x * x), keep = std::exp(-weight / memory);
   joint.instrumented = keep * joint.instrumented + weight * joint.told * joint.seen.transpose();
   joint.products = keep * joint.products + weight * joint.seen * joint.seen.transpose();
 }
 
-void DisturbanceObserver::find_rotor(Eigen::Index j, double mass) noexcept {
+void DisturbanceObserver::find_rotor(Eigen::Index j, double mass, double duration) noexcept {
   const Joint& joint = joints_[static_cast<std::size_t>(j)];
   Eigen::Matrix<double, num_terms, num_terms> equations = joint.instrumented.leftCols<num_terms>();
   equations.diagonal() += Terms(of_rotor, of_share * mass * mass, of_rest, of_rest, of_rest);
@@ -54,21 +53,22 @@ void DisturbanceObserver::find_rotor(Eigen::Index j, double mass) noexcept {
   residual << equations.partialPivLu().solve(joint.instrumented.col(num_terms)), -1.0;
   const double left = residual.dot(joint.products * residual), sum = joint.products(num_terms, num_terms - 1);
   const double variation =
-      joint.products(num_terms, num_terms) - sum * sum / std::max(joint.products(num_terms - 1, num_terms - 1), period_);
+      joint.products(num_terms, num_terms) - sum * sum / std::max(joint.products(num_terms - 1, num_terms - 1), duration);
   const double found = left < (1.0 - explained) * variation ? residual[0] : 0.0;
   const double most = std::isfinite(most_rotor_[j]) ? most_rotor_[j] : 0.0;
-  const double share = std::min(1.0, static_cast<double>(joints_.size()) * period_ / adoption);
+  const double share = std::min(1.0, static_cast<double>(joints_.size()) * duration / adoption);
   rotors_[j] += share * (std::clamp(found, 0.0, most) - rotors_[j]);
 }
 
-void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
-                                 const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix,
+void DisturbanceObserver::update(const Motion& motion, const Eigen::MatrixXd& mass_matrix,
                                  const Eigen::VectorXd& bias) noexcept {
-  acceleration_ = (after - before) / period_;
+  const auto& [before, after, torque, predicted, duration] = motion;
+  const double share = std::min(1.0, duration / time_);
+  acceleration_ = (after - before) / duration;
   // A velocity that leaps once, by an impact or where a simulation starts anew, says nothing about the model. A push goes on.
-  const bool leapt = std::exchange(
-      leaps_,
-      ((acceleration_ - predicted).cwiseAbs().cwiseMin(acceleration_.cwiseAbs()).array() > most_unexpected_.array()).any());
+  const bool leapt = std::exchange(leaps_, ((acceleration_ - predicted).cwiseAbs().cwiseMin(acceleration_.cwiseAbs()).array() >
+                                            most_leap_.array() / duration)
+                                               .any());
   if (leaps_ && !leapt) {
     return;
   }
@@ -79,12 +79,12 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
     if (!(std::abs(surplus) < absurd) || !(std::abs(missing) < absurd)) {
       continue;
     }
-    disturbance_[j] = std::clamp(disturbance_[j] + share_of_period_ * surplus, -most_disturbance_[j], most_disturbance_[j]);
+    disturbance_[j] = std::clamp(disturbance_[j] + share * surplus, -most_disturbance_[j], most_disturbance_[j]);
     const double v = after[j], dry = std::tanh(v / direction);
     identify(j, (Seen() << acceleration_[j], moved, dry, v, 1.0, missing).finished(),
-             Terms(predicted[j], expected, dry, v, 1.0));
+             Terms(predicted[j], expected, dry, v, 1.0), duration);
     if (static_cast<std::size_t>(j) == next_) {
-      find_rotor(j, mass_matrix(j, j));
+      find_rotor(j, mass_matrix(j, j), duration);
     }
   }
   next_ = (next_ + 1) % joints_.size();

@@ -20,7 +20,7 @@ void GravityTorqueConstraint::append(const Moment& now, Bounds& bounds, RowBlock
     if (std::abs(g) < effort) {
       bounds.torque.narrow(i, -effort - bias + g, effort - bias + g, lower, upper);
     }
-    const double step = last.torque == nullptr ? infinity : limits_.effort_rate[i] * now.period;
+    const double step = last.torque == nullptr ? infinity : limits_.effort_rate[i] * now.torque_period;
     if (step < infinity && last.gravity_change != nullptr) {
       const double before = (*last.torque)[i] - bias, change = (*last.gravity_change)[i];
       bounds.torque.narrow(i, before + change - step, before + change + step, lower, upper);

@@ -10,11 +10,12 @@
 namespace sidestep {
 
 JointLimitConstraint::JointLimitConstraint(JointLimits limits, JointLimitSettings settings)
-    : limits_(std::move(limits)), settings_(settings) {}
+    : limits_(std::move(limits)), slower_(limits_), settings_(settings) {}
 
 void JointLimitConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) noexcept {
   const LastCommand& last = now.last;
-  bounds.box.update(limits_, now.position, now.velocity, now.period,
+  slower_.velocity = now.speed_share * limits_.velocity;
+  bounds.box.update(slower_, now.position, now.velocity, now.period,
                     {settings_.position_margin, now.jerk_share, last.acceleration_factor},
                     last.binds ? last.acceleration : nullptr);
   if (last.acceleration_factor > 1.0 && now.wanted != nullptr) {

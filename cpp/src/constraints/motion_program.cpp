@@ -110,12 +110,16 @@ TorqueStatus MotionProgram::solve(const MotionRequest& request, TorqueSolution& 
   const BrakingTorque dynamics{mass_, mass_cholesky_, bias_};
   const bool dynamics_known = known.mass && known.bias;
   Survey found;
-  const Moment now{settings_.period,
+  const MotionPeriods& periods = request.periods;
+  const double period = periods.coming > 0.0 ? periods.coming : settings_.period;
+  const Moment now{period,
+                   effort_has_rate_ && settings_.by_torque ? periods.speed : 1.0,
+                   periods.torque > 0.0 ? std::min(periods.torque, period) : period,
                    position_,
                    velocity_,
                    known.acceleration ? &wanted_ : nullptr,
                    dynamics_known ? &dynamics : nullptr,
-                   known.mass && last.torque != nullptr ? jerk_share() : 1.0,
+                   known.mass && last.torque != nullptr ? jerk_share(periods) : 1.0,
                    last.torque != nullptr && effort_has_rate_,
                    last,
                    request.clearances,
@@ -189,7 +193,11 @@ bool MotionProgram::take_mass(const MotionRequest& request) noexcept {
   return cholesky(mass_, mass_cholesky_);
 }
 
-double MotionProgram::jerk_share() const noexcept { return sidestep::jerk_share(mass_, limits_); }
+double MotionProgram::jerk_share(const MotionPeriods& periods) const noexcept {
+  const double period = periods.coming > 0.0 ? periods.coming : settings_.period;
+  const double rate_share = periods.torque > 0.0 ? std::min(1.0, periods.torque / period) : 1.0;
+  return sidestep::jerk_share(mass_, limits_, rate_share);
+}
 
 void MotionProgram::write(const Moment& now, const Known& known, TorqueSolution& solution) noexcept {
   solution.slack.setZero();
@@ -316,7 +324,7 @@ bool MotionProgram::accept(TorqueSolution& solution) const noexcept {
 void MotionProgram::stop(const Moment& now, bool mass_known, TorqueSolution& solution) const noexcept {
   const BrakingTorque dynamics{mass_, mass_cholesky_, bias_};
   const DampedStop damped{settings_.stop_time, settings_.stop_damping};
-  damped.apply({settings_.period, limits_, velocity_, now.last.torque, dynamics, mass_known}, solution);
+  damped.apply({now.torque_period, limits_, velocity_, now.last.torque, dynamics, mass_known}, solution);
 }
 
 }  // namespace sidestep

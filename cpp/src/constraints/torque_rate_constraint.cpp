@@ -7,9 +7,9 @@
 
 namespace sidestep {
 
-double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits) noexcept {
+double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits, double rate_share) noexcept {
   // Share of the rate for |M j| T [-]: the rest is for the change of the bias.
-  constexpr double of_rate = 0.8;
+  const double of_rate = 0.8 * rate_share;
   double share = 1.0;
   for (Eigen::Index i = 0; i < mass.rows(); ++i) {
     double most = 0.0;
@@ -33,7 +33,7 @@ void TorqueRateConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) 
   }
   for (Eigen::Index i = 0; i < limits_.effort_rate.size(); ++i) {
     const double before = (*now.last.torque)[i] - now.dynamics->bias[i];
-    const double step = limits_.effort_rate[i] * now.period;
+    const double step = limits_.effort_rate[i] * now.torque_period;
     if (step < infinity) {
       bounds.torque.narrow(i, before - step, before + step, Limit::torque_rate_lower, Limit::torque_rate_upper);
     }

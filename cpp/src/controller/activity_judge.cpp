@@ -67,7 +67,7 @@ ActivityJudge::Verdict ActivityJudge::judge(const Evidence& now) noexcept {
     return {Activity::waiting};
   }
   const bool rests = now.goal.is_led_to_target() && is_at_rest(now.arm.velocity());
-  memory_.rest_time = rests ? memory_.rest_time + settings_.period : 0.0;
+  memory_.rest_time = rests ? memory_.rest_time + now.tick.moved : 0.0;
   settle(now);
   return {memory_.no_way ? Activity::blocked : Activity::moving, rests};
 }
@@ -85,14 +85,14 @@ void ActivityJudge::settle(const Evidence& now) noexcept {
   const Way way = now.goal.way(m.rest_time, now.followed);
   if (way != Way::unknown && way != m.way) {
     m.way = way;
-    m.since = now.time;
+    m.since = now.tick.time;
   }
   if (way == Way::open) {
     m.settles = opening;
   } else if (way == Way::none) {
     m.settles = now.goal.planner_status() == OnlinePlannerStatus::no_path && now.goal.reaches_goal() ? unfound : settling;
   }
-  if (now.time - m.since >= std::max(m.settles, settling_looks * look_period_)) {
+  if (now.tick.time - m.since >= std::max(m.settles, settling_looks * look_period_)) {
     m.no_way = m.way == Way::none;
   }
 }

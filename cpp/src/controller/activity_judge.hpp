@@ -28,7 +28,7 @@ class ActivityJudge {
     const MeasuredState& arm;
     const KinematicState& kinematics;  // State of the arm.
     StepStatus attraction;
-    double time = 0.0;
+    const Tick& tick;
     bool stale = false, fresh = false;  // Obstacles are old; velocity or twist is fresh.
     bool under_way = false;             // A trajectory has not ended.
     bool waits = false;                 // A trajectory waits for its path to be free.

@@ -22,7 +22,7 @@ ArmDynamics::ArmDynamics(const std::optional<RigidBodyDynamics>& model, const Ro
     return;
   }
   if (settings.tracking.observer_time < infinity) {
-    observer_.emplace(robot.limits(), settings.period, settings.tracking.observer_time, settings.tracking.observer_share);
+    observer_.emplace(robot.limits(), settings.tracking.observer_time, settings.tracking.observer_share);
   }
   if (model) {
     model_ = model;
@@ -30,11 +30,11 @@ ArmDynamics::ArmDynamics(const std::optional<RigidBodyDynamics>& model, const Ro
   }
 }
 
-void ArmDynamics::observe(bool begins, const Eigen::VectorXd& v, const LastOutput& last) noexcept {
-  if (begins) {
+void ArmDynamics::observe(bool begins, const Eigen::VectorXd& v, const LastOutput& last, const Tick& tick) noexcept {
+  if (begins || tick.gap) {
     last_v_ = v;
   } else if (observer_) {
-    observer_->update(last_v_, v, last.torque, last.acceleration, model_mass_, model_bias_);
+    observer_->update({last_v_, v, last.torque, last.acceleration, tick.elapsed}, model_mass_, model_bias_);
     last_v_ = v;
   }
 }

@@ -7,6 +7,7 @@
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/robot/dynamics.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
+#include "tick.hpp"
 
 namespace sidestep {
 
@@ -36,8 +37,8 @@ class ArmDynamics {
   ArmDynamics(const std::optional<RigidBodyDynamics>& model, const Robot& robot, const ControllerSettings& settings,
               bool torque);
 
-  /// Compares the velocity v with what the last output makes of the last one; `begins`: there is no last one.
-  void observe(bool begins, const Eigen::VectorXd& v, const LastOutput& last) noexcept;
+  /// Compares the velocity v with what the last output makes of the last one; `begins`: there is no last one. A gap says nothing.
+  void observe(bool begins, const Eigen::VectorXd& v, const LastOutput& last, const Tick& tick) noexcept;
   /// Nothing but `load` (nv) [Nm | N] acts on the arm beside the model, as far as is known: what was observed since was a touch.
   void hold(const Eigen::VectorXd& load) noexcept;
   /// The motion begins at the velocity v: what it was before explains nothing.

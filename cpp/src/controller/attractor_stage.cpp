@@ -15,14 +15,14 @@ AttractorStage::AttractorStage(std::shared_ptr<const GeometricSystem> system, co
       arm_clearances_(&arm_.clearances) {}
 
 StepStatus AttractorStage::attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles,
-                                   const ClosingEstimate& closing, Eigen::VectorXd& wanted) noexcept {
+                                   const ClosingEstimate& closing, const Tick& tick, Eigen::VectorXd& wanted) noexcept {
   reference_.horizon = arm_.horizon = lead.avoidance != nullptr ? 0.0 : Horizon::of_obstacles;
   const StepStatus status = system_->acceleration(reference.q, reference.v, lead.goal, obstacles, reference_);
   clearances_ = &closing.corrected(reference_.clearances, corrected_);
   wanted = reference_.acceleration;
   if (!is_fallback(status)) {
     if (lead.avoidance != nullptr) {
-      lead.avoidance->acceleration(reference.q, reference.v, settings_.period, wanted);
+      lead.avoidance->acceleration(reference.q, reference.v, tick.period, wanted);
     } else if (lead.kept_path != nullptr) {
       wanted = *lead.kept_path + reference_.recovery;
     }

@@ -7,6 +7,7 @@
 
 #include "closing_estimate.hpp"
 #include "reference.hpp"
+#include "tick.hpp"
 #include "sidestep/attractor/geometric_system.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/planning/avoidance_trajectory.hpp"
@@ -31,7 +32,7 @@ class AttractorStage {
 
   /// Writes the wanted acceleration of the reference among the obstacles.
   StepStatus attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles, const ClosingEstimate& closing,
-                     Eigen::VectorXd& wanted) noexcept;
+                     const Tick& tick, Eigen::VectorXd& wanted) noexcept;
   /// Evaluates the clearances of the arm, which is not exactly where the reference is; false if they are unusable.
   bool look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
                    const ClosingEstimate& closing) noexcept;

@@ -13,6 +13,7 @@ Controller::Impl::StepState::StepState(Eigen::Index nv) : wanted(Eigen::VectorXd
 Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
     : model(std::move(a), std::move(s)),
       board_(model.arm.num_coordinates()),
+      clock_(model.settings.period, model.settings.synchronous),
       measured_(model.arm.robot(), model.joints, model.plausible, model.settings, sidestep::drives_track(model.settings)),
       sources_(board_.worlds(), model.body, model.arm.robot(), model.arm.body(), model.settings),
       inputs_(board_, model.body, model.arm.robot(), model.joints, model.settings, model.usable, model.clearances,
@@ -26,7 +27,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
       program_(within_margins(model.arm.robot(), model.settings, model.settings.speed), model.settings, model.torque),
       solution_(model.arm.num_coordinates(), model.settings.safety.max_rows),
       guard_(model.body, within_margins(model.arm.robot(), model.settings, model.settings.speed).limits(),
-             model.settings.safety.margin, model.settings.period),
+             model.settings.safety.margin),
       tracker_(model.arm.robot(), model.joints, model.settings, model.torque),
       activity_(model.settings, model.joints, model.look_period),
       worker_(board_, model.system, distances_, look_ahead_, model.settings, model.look_period),

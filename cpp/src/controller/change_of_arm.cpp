@@ -16,6 +16,7 @@ void Controller::Impl::take_requests_of(Impl& before) {
 
 void Controller::Impl::go_on_from(Impl& before) noexcept {
   // First what does not depend on the body, then what it changes.
+  clock_ = before.clock_;
   state_ = before.state_;
   state_.followed = nullptr;
   state_.next_look = 0.0;

@@ -35,8 +35,7 @@ Command::Command(int num_coordinates)
       acceleration(torque),
       velocity(torque),
       position(Eigen::VectorXd::Constant(num_coordinates, std::numeric_limits<double>::quiet_NaN())),
-      disturbance(torque),
-      rotors(torque),
+      observed{torque, torque},
       input_change(torque),
       limits(static_cast<std::size_t>(num_coordinates), Limit::none) {}
 

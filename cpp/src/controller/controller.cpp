@@ -99,24 +99,26 @@ void Controller::remove_obstacle(const std::string& name, const std::string& sou
 }
 std::vector<SourceState> Controller::sources() const { return impl_->sources().states(); }
 
-const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept { return step_with(q, v, nullptr, nullptr); }
+const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, double time) noexcept {
+  return step_with(q, v, nullptr, nullptr, time);
+}
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
-                                ConstVectorRef bias) noexcept {
-  return step_with(q, v, &mass_matrix, &bias);
+                                ConstVectorRef bias, double time) noexcept {
+  return step_with(q, v, &mass_matrix, &bias, time);
 }
 
 const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
-                                     const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+                                     const Eigen::Ref<const Eigen::VectorXd>* bias, double time) noexcept {
   if (!stepper_.enter()) {
     return refused_;
   }
   Recorder* const recorder = records_.load(std::memory_order_acquire);
   if (recorder != nullptr) {
-    recorder->begin_step(q, v, mass_matrix, bias);
+    recorder->begin_step(q, v, mass_matrix, bias, time);
   }
   take_over();
-  const Command& command = impl_->step(q, v, {mass_matrix, bias});
+  const Command& command = impl_->step(q, v, {mass_matrix, bias}, time);
   time_.store(impl_->time(), std::memory_order_relaxed);
   if (recorder != nullptr) {
     recorder->end_step(*impl_);

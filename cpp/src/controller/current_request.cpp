@@ -4,12 +4,12 @@
 
 namespace sidestep {
 
-bool CurrentRequest::update(double period) noexcept {
+bool CurrentRequest::update(double elapsed) noexcept {
   buffer_.update();
   if (buffer_.current().number == number_) {
-    age_ += period;
+    age_ += elapsed;
     if (goal() != nullptr && moves_) {
-      advance(*goal(), period);
+      advance(*goal(), elapsed);
     }
     return false;
   }

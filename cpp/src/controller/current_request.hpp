@@ -13,9 +13,9 @@ class CurrentRequest {
   /// `handed_over`: where other threads put requests; read by `update` alone.
   explicit CurrentRequest(TripleBuffer<NumberedRequest>& handed_over) : buffer_(handed_over) {}
 
-  /// Takes over the newest request: true where it is another one. Otherwise its age, and the place of a goal that moves, go on by a
-  /// period [s].
-  bool update(double period) noexcept;
+  /// Takes over the newest request: true where it is another one. Otherwise its age, and the place of a goal that moves, go on by the
+  /// time that has elapsed [s].
+  bool update(double elapsed) noexcept;
   /// A velocity, twist or trajectory has begun.
   void begun() noexcept { begins_input_ = false; }
   /// The input has led to where a goal at rest takes its place.

@@ -62,8 +62,11 @@ Eigen::VectorXd Controller::Impl::target() const {
 std::optional<Obstruction> Controller::Impl::goal_obstruction() const { return obstruction_at_goal(board_, model.body); }
 
 std::string Controller::Impl::explain_motion() const {
-  if (state_.tick == 0) {
+  if (state_.steps == 0) {
     return "no step was made yet: call step with the measured state, once a period";
+  }
+  if (!clock_.tick().goes_on()) {
+    return "braking to a stop: " + clock_.explain() + "; it must go on from step to step";
   }
   if (touch_.is_touched() && solution_.fault == TorqueFault::none) {
     return touch_.explain();
@@ -71,9 +74,10 @@ std::string Controller::Impl::explain_motion() const {
   if (command_.status == SafetyStatus::stopping) {
     return explain_stop(state_.program, measured_, model.plausible, solution_.fault);
   }
-  std::string text;
+  std::string text = clock_.explain();
+  text += text.empty() ? "" : "; ";
   if (command_.status == SafetyStatus::clearance_lost && command_.coordinate >= 0) {
-    text = explain_overlap(command_, model.system->labels()[static_cast<std::size_t>(command_.coordinate)], obstacles());
+    text += explain_overlap(command_, model.system->labels()[static_cast<std::size_t>(command_.coordinate)], obstacles());
   }
   text += measured_.explain(reference_.next_q, state_.time);
   if (!measured_.agrees_with_reference()) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "../math/settings.hpp"
 #include "path_hold.hpp"
 
 namespace sidestep {
@@ -141,9 +142,9 @@ void GoalFollower::update_posture(const PoseGoal& pose, const Moment& now) noexc
   // A posture that no way leads to: another one.
   const bool fails = planner_status_ == OnlinePlannerStatus::no_path ||
                      planner_status_ == OnlinePlannerStatus::goal_in_collision || (stops_short(&led) && (!planner_ || rests));
-  if (has_target && fails && now.time >= next_posture) {
+  if (has_target && fails && now.tick.time >= next_posture) {
     if (++posture_attempt % most_posture_attempts == 0) {
-      next_posture = now.time + posture_pause;
+      next_posture = now.tick.time + posture_pause;
     }
     next(pose, now);
   }
@@ -159,7 +160,7 @@ const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avo
   if (!planner_) {
     rest_at(target);
   } else {
-    planner_status_ = planner_->step(now.reference.q, now.time, path_);
+    planner_status_ = planner_->step(now.reference.q, now.tick.time, path_, now.tick.gap ? now.tick.held : infinity);
     taken_.answer = planner_->taken();
     taken_.look = planner_->taken_look();
     JointGoal& goal = std::get<JointGoal>(led);
@@ -172,7 +173,7 @@ const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avo
   }
   const bool is_led = planner_ && planner_status_ != OnlinePlannerStatus::no_path;
   if (local_minimum_ && !is_led && !target_blocked && !avoids) {
-    return local_minimum_->pursue(led, now.arm_q, std::numeric_limits<double>::quiet_NaN(), settings_.period);
+    return local_minimum_->pursue(led, now.arm_q, std::numeric_limits<double>::quiet_NaN(), now.tick.moved);
   }
   return led;
 }

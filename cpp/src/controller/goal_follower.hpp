@@ -56,7 +56,7 @@ class GoalFollower : private GoalMemory {
     const Reference& reference;
     const Eigen::VectorXd& arm_q;
     const Obstacles& obstacles;
-    double time = 0.0;
+    const Tick& tick;
     std::uint64_t request_number = 0;
   };
 

@@ -11,6 +11,7 @@
 #include "activity_judge.hpp"
 #include "arm_dynamics.hpp"
 #include "attractor_stage.hpp"
+#include "clock.hpp"
 #include "inputs_stage.hpp"
 #include "joint_program.hpp"
 #include "look_ahead_follower.hpp"
@@ -54,7 +55,8 @@ class Controller::Impl {
   OnlinePlanner* planner() const noexcept { return inputs_.goal().planner(); }
 
   // In the thread of `step`.
-  const Command& step(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told) noexcept;
+  /// `time`: on the caller's clock [s]; NaN: not told.
+  const Command& step(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, double time) noexcept;
   /// The next step with a usable state begins where the arm is.
   void restart() noexcept;
   /// Goes on where another one stopped: the target stays, a way to it is planned anew, and other requests go on. No allocation.
@@ -100,7 +102,7 @@ class Controller::Impl {
   struct StepState {
     explicit StepState(Eigen::Index nv);
 
-    std::uint64_t tick = 0;
+    std::uint64_t steps = 0;
     double time = 0.0, next_look = 0.0;                           // [s]
     bool apart = false;                                           // the arm is not exactly where the reference is
     const Goal* followed = nullptr;                               // Goal by which the reference is led.
@@ -111,9 +113,11 @@ class Controller::Impl {
   };
 
   // Parts of `step`, in its order.
-  void take_over(double time) noexcept;
-  /// The motion begins where the arm is, or the reference goes on by a period. Whether the arm is elsewhere than the reference.
-  bool follow_arm() noexcept;
+  void take_over(const Tick& tick) noexcept;
+  /// Whether planner and barriers look at the obstacles in this step, once a while.
+  bool begin_look(const Obstacles& obstacles, double time) noexcept;
+  /// The motion begins where the arm is, or the reference goes on to now. Whether the arm is elsewhere than the reference.
+  bool follow_arm(const Tick& tick) noexcept;
   void begin_motion() noexcept;
   /// The arm touched something: it begins anew where it is, and waits.
   void judge_touch() noexcept;
@@ -122,32 +126,37 @@ class Controller::Impl {
   /// Activation distances, shorter where the arm is led; `looks`: it is time to look for what moves.
   void update_activation_distances(bool looks, const Obstacles& obstacles) noexcept;
   /// Out of the way of what moves, in place of what is followed; and the pace that the look-ahead leaves.
-  void look_ahead(const Goal& followed, double time, const Obstacles& obstacles) noexcept;
-  Lead lead(const Goal& followed, bool stale) const noexcept;
+  void look_ahead(const Goal& followed, const Tick& tick, const Obstacles& obstacles) noexcept;
+  Lead lead(const Goal& followed, bool stale, const Tick& tick) const noexcept;
+  /// Share of its speed that the arm may use: for the look-ahead's age, and where torques change rarely.
+  double pace(const Tick& tick) const noexcept;
   /// The program's answer to the wanted acceleration, with the clearances of the arm where that is `apart`.
-  TorqueStatus solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told) noexcept;
+  TorqueStatus solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
+                     const Tick& tick) noexcept;
   /// Lets the reference go on only to where it can stop, see BackupManoeuvre.
-  TorqueStatus guard(TorqueStatus solved) noexcept;
-  TorqueStatus track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told) noexcept;
+  TorqueStatus guard(TorqueStatus solved, const Tick& tick) noexcept;
+  TorqueStatus track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
+                     const Tick& tick) noexcept;
   void tell_worker(const Goal& followed, double time, bool wakes) noexcept;
-  /// A stop, where the state is unusable.
-  const Command& stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told) noexcept;
+  /// A stop, where the state or its time is unusable.
+  const Command& stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, const Tick& tick) noexcept;
 
   // What a step reports, see report.cpp.
-  void report_motion(const Goal& followed, bool apart) noexcept;
-  void report_stop() noexcept;
-  void report_torque(bool apart) noexcept;
+  void report_motion(const Goal& followed, bool apart, const Tick& tick) noexcept;
+  void report_timing(const Tick& tick) noexcept;
+  void report_stop(const Tick& tick) noexcept;
+  void report_torque(bool apart, const Tick& tick) noexcept;
   void write_gravity(bool known) noexcept;
   void report_program() noexcept;
   void report_position(const Eigen::VectorXd& q) noexcept;
   void report_clearance(bool apart) noexcept;
-  void report_status(const Goal& followed, bool apart) noexcept;
+  void report_status(const Goal& followed, bool apart, const Tick& tick) noexcept;
 
   // See explain.cpp.
   std::string explain_motion() const;
   std::string explain_way() const;
 
-  InputsStage::Moment moment(const NearReference& near) const noexcept;
+  InputsStage::Moment moment(const NearReference& near, const Tick& tick) const noexcept;
   NearReference near_reference() const noexcept {
     const GeometricSystem::Workspace& at = attractor_.at_reference();
     return {at.clearances, at.state().v(), sources_.closing()};
@@ -157,6 +166,7 @@ class Controller::Impl {
   }
 
   RequestBoard board_;
+  Clock clock_;
   MeasuredState measured_;
   Sources sources_;
   InputsStage inputs_;

@@ -13,9 +13,9 @@ InputsStage::InputsStage(RequestBoard& board, const ClearanceQuery& body, const 
       trajectory_(body, robot.limits(), joints, settings, usable),
       goal_(body, settings, joints, dynamics, board, works) {}
 
-bool InputsStage::update() noexcept {
+bool InputsStage::update(const Tick& tick) noexcept {
   goal_.begin_step();
-  const bool is_another = request_.update(settings_.period);
+  const bool is_another = request_.update(tick.elapsed);
   if (is_another) {
     goal_.leave(request_.goal() != nullptr);
   }
@@ -35,7 +35,7 @@ InputsStage::Target InputsStage::target(const Moment& now) noexcept {
   if (request_.has_input() && !now.stale) {
     follow_input(now);
   }
-  const GoalFollower::Moment moment{now.reference, now.arm_q, now.obstacles, now.time, request_.number()};
+  const GoalFollower::Moment moment{now.reference, now.arm_q, now.obstacles, now.tick, request_.number()};
   const bool is_another_way = goal_.begins_goal() && goal_.begin(own_destination(), request_.moves(), moment);
   if (!request_.is_any() || now.stale) {
     return {&goal_.rest_at(q), is_another_way};
@@ -59,8 +59,8 @@ void InputsStage::begin_input(const Moment& now) noexcept {
 void InputsStage::follow_input(const Moment& now) noexcept {
   const TrajectoryRequest* const trajectory = request_.trajectory();
   if (trajectory == nullptr) {
-    velocity_.follow(request_.request(), is_fresh(), now.pace, now.reference, now.near, input_);
-  } else if (!trajectory_.follow(*trajectory, request_.age(), now.pace, now.reference, now.obstacles, input_)) {
+    velocity_.follow(request_.request(), is_fresh(), now.pace, now.reference, now.near, now.tick, input_);
+  } else if (!trajectory_.follow(*trajectory, request_.age(), now.pace, now.reference, now.obstacles, now.tick, input_)) {
     request_.stand();  // from now on a goal like others
     goal_.begin_next();
   }
@@ -94,7 +94,7 @@ bool InputsStage::judge(const Moment& now, const Eigen::VectorXd& wanted, double
     velocity_.solve_again(*twist, now.reference, now.near);
   }
   velocity_.write_change(request_.request(), now.reference.next_v, change);
-  const bool less = velocity_.judge(request_.request(), now.reference, wanted);
+  const bool less = velocity_.judge(request_.request(), now.reference, wanted, now.tick);
   return is_led_off || less;
 }
 

@@ -24,7 +24,8 @@ class InputsStage {
     const Eigen::VectorXd& arm_q;
     const Obstacles& obstacles;
     const NearReference& near;  // as the last step left it
-    double time = 0.0, pace = 1.0;
+    const Tick& tick;
+    double pace = 1.0;
     bool agrees = true;   // the arm is where the reference is; else nothing begins
     bool stale = false;   // the obstacles are old: the arm stops
     bool avoids = false;  // the arm is led out of the way
@@ -35,7 +36,7 @@ class InputsStage {
   };
 
   /// Takes over the newest request: true where it is another one.
-  bool update() noexcept;
+  bool update(const Tick& tick) noexcept;
   Target target(const Moment& now) noexcept;
   /// Compares the end of the step with what was asked of it: writes what is changed, see Command::input_change; true where less
   /// is done than asked. `wanted`: the reference's acceleration after barriers; `deviation`: see below.

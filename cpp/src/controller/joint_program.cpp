@@ -38,12 +38,13 @@ JointProgram::JointProgram(const Robot& robot, const ControllerSettings& setting
     : program_(robot, program_settings(settings, torque)) {}
 
 TorqueStatus JointProgram::stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
-                                const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque,
+                                const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
                                 TorqueSolution& solution) noexcept {
   const LastCommand last{nullptr, program_.settings().by_torque ? last_torque : nullptr};
   const bool usable = told.mass_matrix != nullptr && told.bias->size() == dynamics.bias().size() && told.bias->allFinite();
-  return usable ? program_.solve({q, v, wanted, *told.mass_matrix, *told.bias, nullptr, {}, last}, solution)
-                : program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), nullptr, {}, last}, solution);
+  const MotionPeriods periods = periods_of(tick);
+  return usable ? program_.solve({q, v, wanted, *told.mass_matrix, *told.bias, nullptr, {}, last, {}, periods}, solution)
+                : program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), nullptr, {}, last, {}, periods}, solution);
 }
 
 LastCommand near_last(const Eigen::VectorXd& acceleration, const Eigen::VectorXd* torque, const ArmDynamics& dynamics,

@@ -3,11 +3,15 @@
 #include "arm_dynamics.hpp"
 #include "sidestep/constraints/motion_program.hpp"
 #include "sidestep/controller/settings.hpp"
+#include "tick.hpp"
 
 namespace sidestep {
 
 /// Less than the limits by what is left for noise, delay, rounding and what the model lacks; velocities of `speed` times theirs.
 Robot within_margins(const Robot& robot, const ControllerSettings& settings, double speed);
+
+/// Periods for the program of a step.
+inline MotionPeriods periods_of(const Tick& tick) noexcept { return {tick.period, tick.torque_period(), tick.speed_share()}; }
 
 /// The quadratic program for torque, or for acceleration where the arm is not moved by torque.
 class JointProgram {
@@ -17,16 +21,19 @@ class JointProgram {
   /// The acceleration nearest to the wanted one at q, v, with the dynamics there.
   [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted,
                                    const ArmDynamics& dynamics, const Clearances* clearances, const SecondState& second,
-                                   const LastCommand& last, TorqueSolution& solution,
+                                   const LastCommand& last, const Tick& tick, TorqueSolution& solution,
                                    const SpeedLimitNow& speed = {}) noexcept {
-    return program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), clearances, second, last, speed}, solution);
+    return program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), clearances, second, last, speed, periods_of(tick)},
+                          solution);
   }
   /// A damped stop of an arm whose state may be unusable, with the dynamics told where they are.
   [[nodiscard]] TorqueStatus stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
-                                  const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque,
+                                  const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
                                   TorqueSolution& solution) noexcept;
   /// Share of the jerk limits with which torques keep their rate.
-  double jerk_share() const noexcept { return program_.settings().by_torque ? program_.jerk_share() : 1.0; }
+  double jerk_share(const Tick& tick) const noexcept {
+    return program_.settings().by_torque ? program_.jerk_share(periods_of(tick)) : 1.0;
+  }
 
  private:
   MotionProgram program_;

@@ -44,9 +44,10 @@ void LookAheadFollower::take(const AvoidanceTrajectory* found) noexcept {
   }
 }
 
-const FoundTrajectory* LookAheadFollower::follow(double time) noexcept {
+const FoundTrajectory* LookAheadFollower::follow(const Tick& tick) noexcept {
+  const double time = tick.time;
   if (avoiding) {
-    trajectory.advance(settings_.period);
+    trajectory.advance(tick.held);
   }
   const bool taken = buffer_.update();
   pending_ = taken || pending_;

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "reference.hpp"
+#include "tick.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/math/triple_buffer.hpp"
 #include "sidestep/planning/avoidance_trajectory.hpp"
@@ -42,15 +43,15 @@ class LookAheadFollower : private LookAheadMemory {
 
   /// In a synchronous controller: looks where it is due. `leader()` moves the goal along its path; it is asked for at a look alone.
   template <class MakeLeader>
-  void pursue(const Goal& followed, const Reference& reference, const Obstacles& obstacles, MakeLeader&& leader) {
+  void pursue(const Goal& followed, const Reference& reference, const Obstacles& obstacles, const Tick& tick,
+              MakeLeader&& leader) {
     if (look_ahead_) {
-      const bool due = look_ahead_->is_due(settings_.period);
-      take(look_ahead_->pursue(followed, reference.q, reference.v, obstacles, settings_.period,
-                               due ? leader() : LookAhead::Leader()));
+      const bool due = look_ahead_->is_due(tick.held);
+      take(look_ahead_->pursue(followed, reference.q, reference.v, obstacles, tick.held, due ? leader() : LookAhead::Leader()));
     }
   }
-  /// Otherwise: moves on by a period, and takes over what the worker found once it is due. Returns what was taken; null: nothing.
-  const FoundTrajectory* follow(double time) noexcept;
+  /// Otherwise: moves on to now, and takes over what the worker found once it is due. Returns what was taken; null: nothing.
+  const FoundTrajectory* follow(const Tick& tick) noexcept;
   /// How old the look-ahead is, and the pace that it leaves beside what moves (`has_movers`).
   void judge_age(double time, bool has_movers) noexcept;
   /// The motion begins anew.

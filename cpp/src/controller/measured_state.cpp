@@ -11,8 +11,7 @@ namespace sidestep {
 namespace {
 
 constexpr int samples_to_begin_anew = 5;  // samples in a row that disagree with the reference: fewer are faults of measurement
-constexpr double longest_pause = 0.1;     // Pause between two steps after which one sample is enough: no loop is so late [s].
-constexpr double longest_periods = 5.0;   // the same, of loops of long periods [periods]
+constexpr double longest_repetition = 0.1;  // time for which the same sample again is an old one [s]
 // Error of position between two samples beside what velocities explain: two to ten times an encoder's noise [rad].
 constexpr double measuring_error = 0.01;
 constexpr double prismatic_error = 0.2;  // the same of prismatic joints, as a share of that [m/rad]
@@ -78,12 +77,9 @@ bool MeasuredState::take(ConstVectorRef sample_q, ConstVectorRef sample_v) noexc
   return true;
 }
 
-double MeasuredState::longest_gap() const noexcept { return std::max(longest_pause, longest_periods * settings_.period); }
-
-void MeasuredState::judge(const Eigen::VectorXd& commanded_q, const Eigen::VectorXd& last_acceleration, double time) noexcept {
-  const auto now = std::chrono::steady_clock::now();
-  elapsed = std::isnan(replayed_elapsed) ? std::chrono::duration<double>(now - stepped_at).count() : replayed_elapsed;
-  const bool paused = elapsed > longest_gap(), was_unusable = std::exchange(sample.unusable, false);
+void MeasuredState::judge(const Eigen::VectorXd& commanded_q, const Eigen::VectorXd& last_acceleration,
+                          const Tick& tick) noexcept {
+  const bool was_unusable = std::exchange(sample.unusable, false);
   sample.q = q;
   sample.v = v;
   agrees = true;
@@ -91,9 +87,9 @@ void MeasuredState::judge(const Eigen::VectorXd& commanded_q, const Eigen::Vecto
   const bool first = begins();
   Comparison comparison;
   if (!first) {
-    predicted_v = last_v + settings_.period * last_acceleration;
-    predicted_q = last_q + settings_.period * predicted_v;
-    comparison = compare_sample(commanded_q);
+    predicted_v = last_v + tick.moved * last_acceleration;
+    predicted_q = last_q + tick.moved * predicted_v;
+    comparison = compare_sample(commanded_q, tick);
   }
   agrees = comparison.is_near && comparison.is_possible;
   if (agrees) {
@@ -101,26 +97,26 @@ void MeasuredState::judge(const Eigen::VectorXd& commanded_q, const Eigen::Vecto
   } else {
     // Without a torque that depends on it the arm can wait until the samples agree with each other.
     sample.disagreeing = drives_track_ && !comparison.is_steady ? 1 : sample.disagreeing + 1;
-    const bool anew = sample.disagreeing >= samples_to_begin_anew || paused || was_unusable;
+    const bool anew = sample.disagreeing >= samples_to_begin_anew || tick.pauses || was_unusable;
     if (anew && plausible_.impossible(sample.q, sample.v).joint >= 0) {  // in another unit: not the arm, from the next on
       plausible_before = false;
       is_bridged = true;
     } else if (anew) {
       sample.disagreeing = 0;
       agrees = begins_anew = true;
-      away.moved_until = time + moved_for;
+      away.moved_until = tick.time + moved_for;
     } else {
       is_bridged = !comparison.is_possible;
     }
   }
-  if (drives_track_ && agrees && !first && !begins_anew && rests_elsewhere(time)) {
+  if (drives_track_ && agrees && !first && !begins_anew && rests_elsewhere(tick.time)) {
     begins_anew = true;
-    away.moved_until = time + moved_for;
+    away.moved_until = tick.time + moved_for;
   }
   if (!first && !begins_anew && !drives_track_ && !is_bridged) {
-    check_repetition();
+    check_repetition(tick);
     if (!is_bridged) {
-      check_velocity();
+      check_velocity(tick);
     }
   }
   sample.last_q = sample.q;
@@ -134,12 +130,11 @@ void MeasuredState::judge(const Eigen::VectorXd& commanded_q, const Eigen::Vecto
   }
 }
 
-MeasuredState::Comparison MeasuredState::compare_sample(const Eigen::VectorXd& commanded_q) const noexcept {
+MeasuredState::Comparison MeasuredState::compare_sample(const Eigen::VectorXd& commanded_q, const Tick& tick) const noexcept {
   // An arm whose drives track the reference comes nearer to it in a step that is late; one that is moved by torque moves on.
-  const double T = settings_.period;
-  const double late = drives_track_ || settings_.synchronous ? 0.0 : std::min(elapsed, longest_gap());
+  const double T = drives_track_ ? tick.expected : tick.moved;
   const double most = drives_track_ ? settings_.tracking.servo_lag : settings_.tracking.largest_error;
-  const double time = std::max(late, T * (1 + sample.disagreeing));
+  const double time = T * (1 + sample.disagreeing);
   Comparison found;
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const double scale = error_scale(j), rounding = scale * measuring_error;
@@ -147,7 +142,7 @@ MeasuredState::Comparison MeasuredState::compare_sample(const Eigen::VectorXd& c
     const double error = std::abs(commanded_q[j] - sample.q[j]), expected = std::abs(commanded_q[j] - predicted_q[j]);
     found.is_near = found.is_near && error <= scale * most;
     found.is_possible = found.is_possible && error <= expected + speed * time + rounding;
-    found.is_steady = found.is_steady && std::abs(sample.q[j] - sample.last_q[j]) <= speed * std::max(late, T) + rounding;
+    found.is_steady = found.is_steady && std::abs(sample.q[j] - sample.last_q[j]) <= speed * T + rounding;
   }
   return found;
 }
@@ -168,7 +163,7 @@ bool MeasuredState::rests_elsewhere(double time) noexcept {
 
 double MeasuredState::error_scale(Eigen::Index j) const noexcept { return joints_.slides(j) ? prismatic_error : 1.0; }
 
-void MeasuredState::check_repetition() noexcept {
+void MeasuredState::check_repetition(const Tick& tick) noexcept {
   // The same numbers again although the arm moves: they are old.
   bool same = sample.q == sample.last_q && sample.v == sample.last_v, moves = false;
   for (Eigen::Index j = 0; j < q.size(); ++j) {
@@ -176,7 +171,7 @@ void MeasuredState::check_repetition() noexcept {
   }
   same = same && moves;
   sample.repeated = same ? sample.repeated + 1 : 0;
-  if (!same || sample.repeated * settings_.period > longest_pause) {
+  if (!same || sample.repeated * tick.expected > longest_repetition) {
     return;
   }
   is_bridged = true;
@@ -186,13 +181,13 @@ void MeasuredState::check_repetition() noexcept {
   }
 }
 
-void MeasuredState::check_velocity() noexcept {
+void MeasuredState::check_velocity(const Tick& tick) noexcept {
   // A velocity that leaps where the position does not is a fault of its measurement, unless it stays so.
   const Eigen::VectorXd& speed = robot_.limits().velocity;
   const bool stays = sample.leaps + 1 >= samples_to_begin_anew;
   bool any = false;
   for (Eigen::Index j = 0; j < q.size(); ++j) {
-    const double moved = (sample.q[j] - sample.last_q[j]) / settings_.period;
+    const double moved = (sample.q[j] - sample.last_q[j]) / tick.moved;
     const double noise = error_scale(j) * least_velocity_leap;
     const bool leaps = std::abs(sample.v[j] - predicted_v[j]) > std::max(velocity_leap * speed[j], noise) &&
                        std::abs(moved - sample.v[j]) > std::abs(moved - predicted_v[j]);
@@ -205,9 +200,9 @@ void MeasuredState::check_velocity() noexcept {
   sample.leaps = any && !stays ? sample.leaps + 1 : 0;
 }
 
-void MeasuredState::filter_velocity(const Eigen::VectorXd& last_acceleration) noexcept {
-  const double share = sample.takes_velocity ? 1.0 : std::min(1.0, settings_.period / settings_.tracking.velocity_filter);
-  predicted_v = last_v + settings_.period * last_acceleration;
+void MeasuredState::filter_velocity(const Eigen::VectorXd& last_acceleration, const Tick& tick) noexcept {
+  const double share = sample.takes_velocity ? 1.0 : std::min(1.0, tick.moved / settings_.tracking.velocity_filter);
+  predicted_v = last_v + tick.moved * last_acceleration;
   v = predicted_v + share * (v - predicted_v);
 }
 
@@ -229,7 +224,6 @@ void MeasuredState::end_step() noexcept {
   known_before = true;
   last_q = q;
   last_v = v;
-  stepped_at = std::chrono::steady_clock::now();  // a pause begins where a step ends, however long it planned
 }
 
 void MeasuredState::end_without_state(bool forgets) noexcept {

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <chrono>
-#include <limits>
 #include <string>
 
 #include "joint_kinds.hpp"
 #include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/robot/robot.hpp"
+#include "tick.hpp"
 
 namespace sidestep {
 
@@ -46,16 +45,11 @@ struct MeasurementMemory {
     double since = 0.0;         // [s]
     double moved_until = 0.0;   // time until when it is worth a word that something else moved the arm [s]
   } away;
-
-  double elapsed = 0.0;  // since the last step, by the machine's clock [s]
-  double replayed_elapsed =
-      std::numeric_limits<double>::quiet_NaN();        // Elapsed time of a recording, in place of the clock's; NaN: none.
-  std::chrono::steady_clock::time_point stepped_at{};  // end of the last step
 };
 
 /// Stage `observe`: the state of the arm, as far as the measurement can be believed.
 ///
-/// A sample that cannot be the arm's is bridged by the prediction q + T q̇, q̇ + T q̈. Where five in a row, or the first after a
+/// A sample that cannot be the arm's is bridged by the prediction q + t q̇, q̇ + t q̈, where t is the time since the last step. Where five in a row, or the first after a
 /// pause, disagree with the reference, the motion begins anew where the arm is.
 class MeasuredState : private MeasurementMemory {
  public:
@@ -65,9 +59,9 @@ class MeasuredState : private MeasurementMemory {
   /// Takes the sample of this step; false where its sizes or numbers are those of no arm.
   bool take(ConstVectorRef q, ConstVectorRef v) noexcept;
   /// Compares the sample with the position that was commanded for now and the motion since the last step.
-  void judge(const Eigen::VectorXd& commanded_q, const Eigen::VectorXd& last_acceleration, double time) noexcept;
+  void judge(const Eigen::VectorXd& commanded_q, const Eigen::VectorXd& last_acceleration, const Tick& tick) noexcept;
   /// Draws the velocity that was predicted to the measured one: noise is filtered.
-  void filter_velocity(const Eigen::VectorXd& last_acceleration) noexcept;
+  void filter_velocity(const Eigen::VectorXd& last_acceleration, const Tick& tick) noexcept;
   /// How far the sample is from what the step commands.
   void compare(const Eigen::VectorXd& commanded_q) noexcept;
   /// The step ends with this state.
@@ -81,7 +75,6 @@ class MeasuredState : private MeasurementMemory {
   }
   void begun() noexcept { begins_anew = false; }
   void go_on_from(const MeasuredState& before) noexcept { static_cast<MeasurementMemory&>(*this) = before; }
-  void give_elapsed(double seconds) noexcept { replayed_elapsed = seconds; }
 
   const Eigen::VectorXd& position() const noexcept { return q; }
   const Eigen::VectorXd& velocity() const noexcept { return v; }
@@ -90,7 +83,6 @@ class MeasuredState : private MeasurementMemory {
   const Eigen::VectorXd& sample_v() const noexcept { return sample.v; }
   double turn(Eigen::Index j) const noexcept { return turns[j]; }
   const Eigen::VectorXd& all_turns() const noexcept { return turns; }
-  double elapsed_time() const noexcept { return elapsed; }
   const Plausibility::Impossible& what_is_impossible() const noexcept { return impossible; }
   /// The motion begins in this step: there is no step before it, or it begins anew.
   bool begins() const noexcept { return !known_before || begins_anew; }
@@ -107,16 +99,15 @@ class MeasuredState : private MeasurementMemory {
   struct Comparison {
     bool is_near = true, is_possible = true, is_steady = true;
   };
-  Comparison compare_sample(const Eigen::VectorXd& commanded_q) const noexcept;
+  Comparison compare_sample(const Eigen::VectorXd& commanded_q, const Tick& tick) const noexcept;
   /// Whether the arm rests away from what its drives were commanded, for longer than they lag.
   bool rests_elsewhere(double time) noexcept;
   /// Bridges a sample that is an old one again.
-  void check_repetition() noexcept;
+  void check_repetition(const Tick& tick) noexcept;
   /// Replaces velocities that leap alone.
-  void check_velocity() noexcept;
+  void check_velocity(const Tick& tick) noexcept;
   /// By which an error that counts of joint j differs from that of revolute joints: 1, or 0.2 m/rad where it is prismatic.
   double error_scale(Eigen::Index j) const noexcept;
-  double longest_gap() const noexcept;
 
   const Robot& robot_;
   const JointKinds& joints_;

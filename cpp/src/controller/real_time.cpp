@@ -16,9 +16,9 @@
 namespace sidestep {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
-double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+double seconds(SteadyClock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 /// Whether this thread is now before all others that are not prioritised themselves.
 bool prioritise() noexcept {
@@ -80,15 +80,15 @@ void RealTimeRun::run() noexcept {
   record_.prioritised = settings_.priority && prioritise();
   wake_promptly();
   const double step = controller_.settings().period;
-  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(step));
-  const Clock::time_point begin = Clock::now();
+  const auto period = std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(step));
+  const SteadyClock::time_point begin = SteadyClock::now();
   std::int64_t done = 0;
   for (; done < settings_.steps && !stop_; ++done) {
-    const Clock::time_point due = begin + (done + 1) * period;
+    const SteadyClock::time_point due = begin + (done + 1) * period;
     std::this_thread::sleep_until(due);
-    const Clock::time_point woken = Clock::now();
-    const Command& command = controller_.step(now_.q, now_.v);
-    const Clock::time_point ended = Clock::now();
+    const SteadyClock::time_point woken = SteadyClock::now();
+    const Command& command = controller_.step(now_.q, now_.v, static_cast<double>(done + 1) * step);  // the model's own clock
+    const SteadyClock::time_point ended = SteadyClock::now();
     record_.late[done] = seconds(woken - due);
     record_.taken[done] = seconds(ended - woken);
     record_.missed += ended > due + period;

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -147,9 +146,9 @@ Recorder::Recorder(const std::filesystem::path& path, const Controller::Impl& fi
       setters_(setters),
       ring_(ring_capacity, first.model.settings.synchronous),
       synchronous_(first.model.settings.synchronous) {
-  if (first.state_.tick != 0) {
+  if (first.state_.steps != 0) {
     throw std::runtime_error("controller: recording begins before the first step, but it has made " +
-                             std::to_string(first.state_.tick) + "; make another controller");
+                             std::to_string(first.state_.steps) + "; make another controller");
   }
   recording::HeadRecord head;
   head.sidestep_version = recording::sidestep_version();
@@ -230,15 +229,14 @@ void Recorder::add_arm(const Controller::Impl& arm, const std::vector<Controller
 }
 
 void Recorder::begin_step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
-                          const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+                          const Eigen::Ref<const Eigen::VectorXd>* bias, double time) noexcept {
   ++step_;
   if (full_) {
     return;
   }
   ring_.begin();
   recording::Encoder<RecordRing> out(ring_);
-  // NaN: without a time that the step is told, which no step is so far.
-  out(step_, std::numeric_limits<double>::quiet_NaN(), q, v, mass_matrix != nullptr);
+  out(step_, time, q, v, mass_matrix != nullptr);
   if (mass_matrix != nullptr) {
     out(*mass_matrix, *bias);
   }
@@ -253,7 +251,8 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
   Controller::Impl::Taken& taken = arm.taken_;
   recording::Encoder<RecordRing> out(ring_);
   out(arm.arm_number, arm.inputs_.request().number(), arm.sources_.number(), taken.request, taken.obstacles);
-  out(TakenKind::elapsed, arm.measured_.elapsed_time());
+  out(TakenKind::elapsed, arm.clock_.machine().since_end);
+  out(TakenKind::interval, arm.clock_.machine().since_begin, arm.clock_.machine().now);
   if (taken.restarts) {
     out(TakenKind::restart);
   }

@@ -77,7 +77,7 @@ class Recorder {
 
   // Of the step.
   void begin_step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
-                  const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
+                  const Eigen::Ref<const Eigen::VectorXd>* bias, double time) noexcept;
   /// After the step of this arm.
   void end_step(Controller::Impl& arm) noexcept;
 

@@ -131,7 +131,7 @@ void describe(auto& archive, Of<TimedPath> auto& p) {
 }
 
 /// What of a step follows its inputs: one of these, then its content; `end` is the last.
-enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, answer, elapsed, look, restart };
+enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, answer, elapsed, look, restart, interval };
 
 /// Writes the fields of a command one after the other. No allocation.
 template <class Sink>

@@ -20,6 +20,19 @@ void Reference::begin(const Eigen::VectorXd& at, const Eigen::VectorXd& velocity
   smooth_a.setZero();
 }
 
+void Reference::hold(ControllerSettings::Output output, const Tick& tick) noexcept {
+  const double t = tick.held, T = tick.expected;
+  if (tick.is_as_expected() || output == ControllerSettings::Output::position) {
+    return;
+  }
+  if (output == ControllerSettings::Output::velocity) {
+    next_q = q + t * next_v;
+    return;
+  }
+  next_v = v + t * a;
+  next_q = q + t * v + 0.5 * t * (t + T) * a;
+}
+
 void Reference::advance(const Eigen::VectorXd& acceleration, bool rises, const Eigen::VectorXd& jerk, double period) noexcept {
   if (acceleration.allFinite()) {
     a = acceleration;

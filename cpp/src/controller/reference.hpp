@@ -2,6 +2,9 @@
 
 #include <Eigen/Core>
 
+#include "sidestep/controller/settings.hpp"
+#include "tick.hpp"
+
 namespace sidestep {
 
 /// The motion that the controller integrates and the arm tracks [rad | m] and its derivatives (nv each):
@@ -13,6 +16,10 @@ struct Reference {
   /// The next period begins with an arm at q, velocity v (nv); nothing is known of an acceleration. `stops`: drives that are on the
   /// way back to an old command stop with the new one.
   void begin(const Eigen::VectorXd& at, const Eigen::VectorXd& velocity, bool stops) noexcept;
+  /// Corrects the end of this period where the next step came earlier or later than expected: what was commanded is held until then.
+  /// An acceleration or torque moved the arm on by q̇⁺ = q̇ + t q̈, q⁺ = q + t q̇ + t (t + T)/2 q̈ in the time t, where samples are T
+  /// apart; a velocity by t q̇⁺; at a position that is commanded the arm stays.
+  void hold(ControllerSettings::Output output, const Tick& tick) noexcept;
   /// The next period begins where this one ends.
   void go_on() noexcept {
     q = next_q;

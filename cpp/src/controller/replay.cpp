@@ -226,7 +226,7 @@ class Replay {
 std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content) {
   recording::Decoder in(content);
   std::uint64_t number = 0, arm = 0, request = 0, obstacles = 0, request_before = 0, obstacles_before = 0;
-  double time = 0.0;  // that the step is told; none so far
+  double time = 0.0;  // that the step is told; NaN: none
   Eigen::VectorXd q, v, bias;
   Eigen::MatrixXd mass_matrix;
   bool dynamics = false;
@@ -254,7 +254,7 @@ std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content)
   step_ = number;
   const Eigen::Ref<const Eigen::MatrixXd> M(mass_matrix);
   const Eigen::Ref<const Eigen::VectorXd> h(bias);
-  const Command& command = impl.step(q, v, dynamics ? ToldDynamics{&M, &h} : ToldDynamics{});
+  const Command& command = impl.step(q, v, dynamics ? ToldDynamics{&M, &h} : ToldDynamics{}, time);
   std::optional<ReplayDifference> difference = recording::first_difference(fields_, in.rest(), command);
   if (impl.arm_number != arm) {
     difference = ReplayDifference{0, "arm", "number " + std::to_string(arm), "number " + std::to_string(impl.arm_number)};
@@ -329,6 +329,7 @@ void Replay::give_arm(std::uint64_t number) {
 void Replay::give_taken(recording::Decoder& in) {
   using recording::TakenKind;
   Impl& impl = *controller_.impl_;
+  Clock::Machine machine;  // Recordings of 0.2 have no interval: every step was on time.
   for (TakenKind kind = in.take<TakenKind>(); kind != TakenKind::end; kind = in.take<TakenKind>()) {
     switch (kind) {
       case TakenKind::posture: {
@@ -353,7 +354,8 @@ void Replay::give_taken(recording::Decoder& in) {
         break;
       }
       case TakenKind::restart: impl.restart(); break;
-      case TakenKind::elapsed: impl.measured_.give_elapsed(in.take<double>()); break;
+      case TakenKind::elapsed: machine.since_end = in.take<double>(); break;
+      case TakenKind::interval: in(machine.since_begin, machine.now); break;
       case TakenKind::look: {
         OnlinePlanner::Looked look;
         in(look.time, look.duration);
@@ -379,6 +381,7 @@ void Replay::give_taken(recording::Decoder& in) {
       default: throw std::invalid_argument("it took over something that this Sidestep does not know");
     }
   }
+  impl.clock_.give(machine);
 }
 
 Request Replay::request_of(const recording::RequestRecord& record, const Impl& impl) const {

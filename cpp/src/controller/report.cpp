@@ -33,8 +33,11 @@ SafetyStatus safety_of(TorqueStatus program) noexcept {
 
 }  // namespace
 
-void Controller::Impl::report_motion(const Goal& followed, bool apart) noexcept {
-  report_torque(apart);
+void Controller::Impl::report_timing(const Tick& tick) noexcept { command_.timing = {tick.period, tick.late, tick.missed}; }
+
+void Controller::Impl::report_motion(const Goal& followed, bool apart, const Tick& tick) noexcept {
+  report_timing(tick);
+  report_torque(apart, tick);
   write_gravity(true);
   command_.deviation = inputs_.judge_deviation(reference_);
   command_.delay = inputs_.trajectory_delay();
@@ -43,16 +46,17 @@ void Controller::Impl::report_motion(const Goal& followed, bool apart) noexcept 
   command_.on_path = inputs_.goal().is_led_to_target() && inputs_.goal().is_on_path(&followed);
   command_.velocity = reference_.next_v;
   if (model.settings.output == ControllerSettings::Output::velocity) {
-    tracker_.write_velocity(reference_, measured_.position(), true, command_.velocity);
+    tracker_.write_velocity(reference_, measured_.position(), true, tick, command_.velocity);
   }
   report_position(reference_.next_q);
   report_clearance(apart);
-  report_status(followed, apart);
+  report_status(followed, apart, tick);
 }
 
-void Controller::Impl::report_stop() noexcept {
+void Controller::Impl::report_stop(const Tick& tick) noexcept {
   const double unknown = std::numeric_limits<double>::quiet_NaN();
-  report_torque(state_.apart);
+  report_timing(tick);
+  report_torque(state_.apart, tick);
   write_gravity(false);
   command_.deviation = command_.delay = 0.0;
   report_program();
@@ -67,7 +71,7 @@ void Controller::Impl::report_stop() noexcept {
   if (tracker_.drives_track() && measured_.was_known()) {
     command_.velocity = reference_.next_v;
     if (model.settings.output == ControllerSettings::Output::velocity) {
-      tracker_.write_velocity(reference_, measured_.position(), false, command_.velocity);
+      tracker_.write_velocity(reference_, measured_.position(), false, tick, command_.velocity);
     }
     report_position(reference_.next_q);
   } else {
@@ -76,18 +80,18 @@ void Controller::Impl::report_stop() noexcept {
   }
 }
 
-void Controller::Impl::report_torque(bool apart) noexcept {
+void Controller::Impl::report_torque(bool apart, const Tick& tick) noexcept {
   command_.torque.setZero();
   if (!model.torque) {
     return;
   }
   command_.torque = tracker_.solution().torque;
-  if (tracker_.keep_torque_rate(last_, dynamics_, command_.torque) && !apart) {
+  if (tracker_.keep_torque_rate(last_, dynamics_, tick, command_.torque) && !apart) {
     reference_.torque = command_.torque;
   }
   if (dynamics_.observer()) {
-    command_.disturbance = dynamics_.observer()->disturbance();
-    command_.rotors = dynamics_.observer()->rotors();
+    command_.observed.disturbance = dynamics_.observer()->disturbance();
+    command_.observed.rotors = dynamics_.observer()->rotors();
   }
 }
 
@@ -135,7 +139,7 @@ void Controller::Impl::report_clearance(bool apart) noexcept {
   }
 }
 
-void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept {
+void Controller::Impl::report_status(const Goal& followed, bool apart, const Tick& tick) noexcept {
   SafetyStatus status = safety_of(state_.program);
   if (measured_.is_far_from_command()) {
     status = std::max(status, SafetyStatus::tracking_lost);
@@ -152,13 +156,13 @@ void Controller::Impl::report_status(const Goal& followed, bool apart) noexcept 
   }
   command_.input_change.setZero();
   const NearReference near = near_reference();
-  const bool reduced = inputs_.judge(moment(near), state_.wanted, command_.deviation, command_.input_change);
+  const bool reduced = inputs_.judge(moment(near, tick), state_.wanted, command_.deviation, command_.input_change);
   if (reduced && status == SafetyStatus::ok) {
     status = SafetyStatus::limited;
   }
   const ActivityJudge::Verdict verdict = activity_.judge(
       {inputs_.request(), inputs_.destination(), inputs_.goal(), &followed, measured_, arm_state(apart), state_.attraction,
-       state_.time, must_rest(), inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
+       tick, must_rest(), inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
   command_.activity = touch_.is_touched() && !stale ? Activity::waiting : verdict.activity;
   if (verdict.rests) {
     inputs_.goal().set_rests(*verdict.rests);

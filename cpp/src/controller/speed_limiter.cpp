@@ -19,25 +19,25 @@ SpeedLimiter::SpeedLimiter(const ClearanceQuery& body, const ControllerSettings&
     : body_(body), workspace_(body), settings_(settings), frames_(body.robot()) {}
 
 std::optional<double> SpeedLimiter::update(const KinematicState& reference, const KinematicState& arm, const Eigen::VectorXd& q,
-                                           const Obstacles& obstacles, bool known_before, Command& command) noexcept {
+                                           const Obstacles& obstacles, bool known_before, const Tick& tick,
+                                           Command& command) noexcept {
   command.speed = frames_.fastest(arm).speed;
   if (!settings_.speed_limits) {
     command.speed_limit = infinity;
     return std::nullopt;
   }
   const SpeedLimitSettings& limits = *settings_.speed_limits;
-  const double period = settings_.period;
   const double far = limits.far_distance, before = known_before ? std::min(command.distance, far) : far;
   const ClearanceQuery::Nearest nearest = body_.nearest_obstacle(q, obstacles, far, workspace_);
-  const double now = nearest.clearance, closing = std::clamp(before - now, 0.0, (command.speed + walking) * period);
+  const double now = nearest.clearance, closing = std::clamp(before - now, 0.0, (command.speed + walking) * tick.moved);
   nearest_point_ = nearest.point;
   command.distance = now < far ? now : infinity;
   command.speed_limit = limits.allowed(now);
-  const double next = limits.allowed(now - closing);
+  const double next = limits.allowed(now - closing * (tick.period / tick.moved));
   const Eigen::VectorXd& most = body_.robot().limits().acceleration;
   at_reference_ = {&reference, &most, command.speed_limit, next};
   at_arm_ = {&arm, &most, command.speed_limit, next};
-  return limits.allowed(now - closing / period * foresight);
+  return limits.allowed(now - closing / tick.moved * foresight);
 }
 
 std::string SpeedLimiter::explain(const Command& command, const TorqueSolution& solution, const Obstacles& obstacles) const {

@@ -20,7 +20,7 @@ class SpeedLimiter {
   /// distance, of which it takes the last distance where the last step had one (`known_before`). The speed limit [m/s] for the path
   /// that is followed; none without these settings.
   std::optional<double> update(const KinematicState& reference, const KinematicState& arm, const Eigen::VectorXd& q,
-                               const Obstacles& obstacles, bool known_before, Command& command) noexcept;
+                               const Obstacles& obstacles, bool known_before, const Tick& tick, Command& command) noexcept;
 
   /// Limits for the program at either state; none without these settings.
   const SpeedLimitNow& at_reference() const noexcept { return at_reference_; }

@@ -2,98 +2,111 @@
 #include <algorithm>
 #include <utility>
 
+#include "../math/settings.hpp"
 #include "impl.hpp"
 #include "path_hold.hpp"
 
 namespace sidestep {
 
-const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told) noexcept {
+const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, double told_time) noexcept {
   const ControllerSettings& settings = model.settings;
-  const double time = state_.time = static_cast<double>(++state_.tick) * settings.period;
+  // Tick = clock(t)
+  const Tick& tick = clock_.begin_step(told_time);
+  const double time = state_.time = tick.time;
+  ++state_.steps;
   const bool known = measured_.take(q, v);
-  take_over(time);
-  if (!known) {
-    return stop(q, v, told);
+  take_over(tick);
+  if (!known || !tick.goes_on()) {
+    return stop(q, v, told, tick);
   }
-  // Measurement = observe(q, v, t)
-  measured_.judge(reference_.next_q, last_.acceleration, time);
+  // Measurement = observe(q, v, Tick)
+  reference_.hold(settings.output, tick);
+  measured_.judge(reference_.next_q, last_.acceleration, tick);
   board_.show_measured(measured_.position());
   judge_touch();
-  dynamics_.observe(measured_.begins() || touch_.is_touched(), measured_.velocity(), last_);
-  bool& apart = state_.apart = follow_arm();
+  dynamics_.observe(measured_.begins() || touch_.is_touched(), measured_.velocity(), last_, tick);
+  bool& apart = state_.apart = follow_arm(tick);
 
   // Target = inputs.target(World)
   const Obstacles& obstacles = sources_.obstacles();
-  const bool looks = time >= state_.next_look || inputs_.goal().begins_goal();
-  if (looks) {
-    state_.next_look = time + model.look_period - 0.5 * settings.period;
-    if (OnlinePlanner* const planner = inputs_.goal().planner(); planner != nullptr && settings.synchronous) {
-      board_.guarded([&] { planner->set_obstacles(obstacles); });
-    }
-  }
+  const bool looks = begin_look(obstacles, time);
   const NearReference near = near_reference();
-  const InputsStage::Target target = inputs_.target(moment(near));
+  const InputsStage::Target target = inputs_.target(moment(near, tick));
   const Goal& followed = *(state_.followed = target.followed);
   taken_.goal = inputs_.goal().taken();
   if (target.is_another_way) {
     activity_.forget(time);
   }
   update_activation_distances(looks, obstacles);
-  look_ahead(followed, time, obstacles);
+  look_ahead(followed, tick, obstacles);
 
   // Desired = attractor(Target, World)
-  state_.attraction = attractor_.attract(lead(followed, must_rest()), reference_, obstacles, sources_.closing(), state_.wanted);
+  state_.attraction = attractor_.attract(lead(followed, must_rest(), tick), reference_, obstacles, sources_.closing(), tick,
+                                         state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
-  state_.program = guard(solve(state_.wanted, apart, followed, told));
+  state_.program = guard(solve(state_.wanted, apart, followed, told, tick), tick);
   reference_.advance(solution_.acceleration,
                      state_.program == TorqueStatus::relaxed_safety || state_.program == TorqueStatus::clearance_lost,
-                     model.arm.robot().limits().jerk, settings.period);
+                     model.arm.robot().limits().jerk, tick.period);
 
   // Command = tracker(...)
-  state_.program = track(state_.program, apart, command_.tracking_error, told);
+  state_.program = track(state_.program, apart, command_.tracking_error, told, tick);
   if (measured_.bridges_sample()) {  // what is reported is of the arm, as far as it is measured
     apart = attractor_.look_at_arm(measured_.sample_q(), measured_.sample_v(), obstacles, sources_.closing()) || apart;
     command_.tracking_error = (reference_.q - measured_.sample_q()).cwiseAbs().maxCoeff();
   }
   measured_.compare(reference_.next_q);
-  report_motion(followed, apart);
+  report_motion(followed, apart, tick);
   if (!settings.synchronous && (looks || inputs_.goal().asks())) {
     tell_worker(followed, time, inputs_.goal().take_question());
   }
   last_.take(command_.acceleration, command_.torque, model.torque);
   measured_.end_step();
+  clock_.end_step();
   return command_;
 }
 
-void Controller::Impl::take_over(double time) noexcept {
-  if (sources_.update(measured_.position(), {time, model.settings.period, 0.0})) {
+bool Controller::Impl::begin_look(const Obstacles& obstacles, double time) noexcept {
+  const bool looks = time >= state_.next_look || inputs_.goal().begins_goal();
+  if (looks) {
+    state_.next_look = time + model.look_period - 0.5 * model.settings.period;
+    if (OnlinePlanner* const planner = inputs_.goal().planner(); planner != nullptr && model.settings.synchronous) {
+      board_.guarded([&] { planner->set_obstacles(obstacles); });
+    }
+  }
+  return looks;
+}
+
+void Controller::Impl::take_over(const Tick& tick) noexcept {
+  if (sources_.update(measured_.position(), {tick.time, tick.elapsed, tick.offset})) {
     guard_.invalidate();
   }
-  if (inputs_.update()) {
+  if (inputs_.update(tick)) {
     distances_.forget();
     if (inputs_.request().goal() == nullptr) {
-      activity_.forget(time);
+      activity_.forget(tick.time);
     }
   }
 }
 
-bool Controller::Impl::follow_arm() noexcept {
+bool Controller::Impl::follow_arm(const Tick& tick) noexcept {
   const bool begins = measured_.begins();
   if (begins) {
     begin_motion();
   }
   const Eigen::VectorXd &q = measured_.position(), &v = measured_.velocity();
-  command_.tracking_error = begins ? 0.0 : (reference_.next_q - q).cwiseAbs().maxCoeff();
+  const double lead = tracker_.drives_track() ? 0.0 : tick.lead();
+  command_.tracking_error = begins ? 0.0 : (reference_.next_q - lead * reference_.next_v - q).cwiseAbs().maxCoeff();
   reference_.go_on();
-  if (touch_.is_touched() && tracker_.yield(q, dynamics_.mass(), touch_.resistance(), reference_)) {
+  if (touch_.is_touched() && tracker_.yield(q, dynamics_.mass(), touch_.resistance(), tick, reference_)) {
     guard_.reset();
   }
-  tracker_.write_coupling(reference_, q, state_.coupling);
+  tracker_.write_coupling(reference_, q, tick, state_.coupling);
   const bool apart = reference_.q != q || reference_.v != v;
   if (apart && !begins) {
-    measured_.filter_velocity(last_.acceleration);
+    measured_.filter_velocity(last_.acceleration, tick);
   }
   return apart;
 }
@@ -135,13 +148,13 @@ void Controller::Impl::begin_motion() noexcept {
   }
 }
 
-InputsStage::Moment Controller::Impl::moment(const NearReference& near) const noexcept {
+InputsStage::Moment Controller::Impl::moment(const NearReference& near, const Tick& tick) const noexcept {
   return {reference_,
           measured_.position(),
           sources_.obstacles(),
           near,
-          state_.time,
-          look_ahead_.current_pace(),
+          tick,
+          pace(tick),
           measured_.agrees_with_reference(),
           must_rest(),
           look_ahead_.is_followed()};
@@ -180,13 +193,13 @@ void Controller::Impl::update_activation_distances(bool looks, const Obstacles& 
   }
 }
 
-void Controller::Impl::look_ahead(const Goal& followed, double time, const Obstacles& obstacles) noexcept {
+void Controller::Impl::look_ahead(const Goal& followed, const Tick& tick, const Obstacles& obstacles) noexcept {
   const ControllerSettings& settings = model.settings;
   GoalFollower& goal = inputs_.goal();
   const TrajectoryRequest* const trajectory = inputs_.request().trajectory();
   if (settings.synchronous) {
     board_.guarded([&] {
-      look_ahead_.pursue(followed, reference_, obstacles, [&] {
+      look_ahead_.pursue(followed, reference_, obstacles, tick, [&] {
         if (inputs_.input().is_followed() && trajectory != nullptr) {
           return leader_along(settings, trajectory->path, inputs_.trajectory().time(), inputs_.trajectory().rate());
         }
@@ -195,21 +208,29 @@ void Controller::Impl::look_ahead(const Goal& followed, double time, const Obsta
                    : LookAhead::Leader();
       });
     });
+    if (!settings.speed_limits) {
+      goal.limit_pace(pace(tick));
+    }
     return;
   }
   if (look_ahead_.is_on()) {
-    taken_.trajectory = look_ahead_.follow(time);
+    taken_.trajectory = look_ahead_.follow(tick);
   }
-  look_ahead_.judge_age(time, sources_.has_movers());
-  command_.background.planner_age = goal.planner_age(time);
+  look_ahead_.judge_age(tick.time, sources_.has_movers());
+  command_.background.planner_age = goal.planner_age(tick.time);
   command_.background.look_ahead_age = look_ahead_.age();
   command_.background.pace = look_ahead_.current_pace();
-  if (look_ahead_.is_on() && !settings.speed_limits) {
-    goal.limit_pace(look_ahead_.current_pace());
+  if (!settings.speed_limits) {
+    goal.limit_pace(pace(tick));
   }
 }
 
-Lead Controller::Impl::lead(const Goal& followed, bool stale) const noexcept {
+double Controller::Impl::pace(const Tick& tick) const noexcept {
+  const bool has_rate = model.torque && model.arm.robot().limits().effort_rate.minCoeff() < infinity;
+  return std::min(look_ahead_.current_pace(), has_rate ? tick.speed_share() : 1.0);
+}
+
+Lead Controller::Impl::lead(const Goal& followed, bool stale, const Tick& tick) const noexcept {
   const InputTarget& input = inputs_.input();
   const bool avoids = look_ahead_.is_followed();
   // Paths, trajectories and velocities are slowed themselves; what leads straight is damped.
@@ -218,11 +239,11 @@ Lead Controller::Impl::lead(const Goal& followed, bool stale) const noexcept {
           : input.is_followed() ? input.attraction()
                                 : followed,
           avoids ? &look_ahead_.followed() : nullptr, inputs_.keeps_path() ? &input.desired_acceleration() : nullptr,
-          slows_itself ? 1.0 : look_ahead_.current_pace(), stale || !measured_.agrees_with_reference()};
+          slows_itself ? 1.0 : pace(tick), stale || !measured_.agrees_with_reference()};
 }
 
-TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed,
-                                     const ToldDynamics& told) noexcept {
+TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
+                                     const Tick& tick) noexcept {
   SecondState second;
   if (apart && attractor_.look_at_arm(measured_.position(), measured_.velocity(), sources_.obstacles(), sources_.closing())) {
     second = {&attractor_.arm_clearances(), &measured_.velocity()};
@@ -232,9 +253,9 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     dynamics_.update_gravity(at_arm, !measured_.was_known());
   }
   const std::optional<double> path_speed =
-      speed_.update(at_reference, at_arm, measured_.position(), sources_.obstacles(), measured_.was_known(), command_);
+      speed_.update(at_reference, at_arm, measured_.position(), sources_.obstacles(), measured_.was_known(), tick, command_);
   if (path_speed && &followed == inputs_.goal().led_goal()) {
-    inputs_.goal().limit_speed(*path_speed, look_ahead_.current_pace(), speed_.frames());
+    inputs_.goal().limit_speed(*path_speed, pace(tick), speed_.frames());
   }
   LastCommand last{&reference_.smooth_a};
   if (model.torque) {
@@ -244,23 +265,23 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     dynamics_.update(at_reference, !apart || !dynamics_.has_model() ? told : ToldDynamics{});
   }
   const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
-                                             last, solution_, speed_.at_reference());
+                                             last, tick, solution_, speed_.at_reference());
   if (model.torque) {
     reference_.torque = solution_.torque;
   }
   return status;
 }
 
-TorqueStatus Controller::Impl::guard(TorqueStatus solved) noexcept {
+TorqueStatus Controller::Impl::guard(TorqueStatus solved, const Tick& tick) noexcept {
   // Beside what moves a stop would only wait for it; and the way out of what is lost comes before the jerk.
   if (sources_.has_movers() || look_ahead_.is_followed() || solution_.least_clearance < 0.0 ||
       !solution_.acceleration.allFinite()) {
     guard_.reset();
     return solved;
   }
-  const StopTorque torque{dynamics_.mass(), dynamics_.bias(), program_.jerk_share()};
-  if (!guard_.keep(reference_.q, reference_.v, reference_.smooth_a, sources_.obstacles(), model.torque ? &torque : nullptr,
-                   solution_.acceleration)) {
+  const StopTorque torque{dynamics_.mass(), dynamics_.bias(), program_.jerk_share(tick)};
+  const GuardedMotion now{reference_.q, reference_.v, reference_.smooth_a, tick.period, tick.is_as_expected()};
+  if (!guard_.keep(now, sources_.obstacles(), model.torque ? &torque : nullptr, solution_.acceleration)) {
     return solved;
   }
   solution_.slack.setZero();
@@ -272,8 +293,8 @@ TorqueStatus Controller::Impl::guard(TorqueStatus solved) noexcept {
   return TorqueStatus::limited;
 }
 
-TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tracking_error,
-                                     const ToldDynamics& told) noexcept {
+TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
+                                     const Tick& tick) noexcept {
   if (!apart || tracker_.drives_track()) {
     tracker_.follow(solution_);
     return solved;
@@ -283,35 +304,41 @@ TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tra
   }
   return tracker_.track(
       reference_, {measured_.position(), measured_.velocity(), attractor_.arm_clearances(), dynamics_, last_, speed_.at_arm()},
-      tracking_error, solved);
+      tracking_error, solved, tick);
 }
 
-const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told) noexcept {
+const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, const Tick& tick) noexcept {
   const bool reference_goes_on = tracker_.drives_track() && measured_.was_known();
   if (reference_goes_on) {  // drives follow the reference, wherever the arm is: it comes to rest
     const bool q_known = q.size() == reference_.q.size() && q.allFinite() && measured_.what_is_impossible().joint < 0;
+    reference_.hold(model.settings.output, tick);
     reference_.go_on();
     state_.wanted = -reference_.v / model.settings.stop_time;
     static_cast<void>(program_.solve(reference_.q, reference_.v, state_.wanted, dynamics_, nullptr, {},
-                                     LastCommand{&reference_.smooth_a}, tracker_.solution()));
+                                     LastCommand{&reference_.smooth_a}, tick, tracker_.solution()));
     solution_.acceleration = tracker_.solution().acceleration;
     solution_.fault = q_known ? TorqueFault::velocity : TorqueFault::position;
     state_.program = TorqueStatus::fallback_invalid_input;
     guard_.reset();
-    reference_.advance(solution_.acceleration, false, model.arm.robot().limits().jerk, model.settings.period);
+    reference_.advance(solution_.acceleration, false, model.arm.robot().limits().jerk, tick.period);
   } else {
     const Eigen::VectorXd none;
     const bool is_impossible = measured_.what_is_impossible().joint >= 0;  // no number of it is used
     state_.wanted.setZero();
+    if (!tick.goes_on() && q.size() == v.size() && v.size() == state_.wanted.size() && v.allFinite()) {
+      state_.wanted = -v / model.settings.stop_time;
+    }
     state_.program = program_.stop(is_impossible ? ConstVectorRef(none) : q, is_impossible ? ConstVectorRef(none) : v,
-                                   state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, solution_);
+                                   state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, tick, solution_);
+    state_.program = std::max(state_.program, TorqueStatus::fallback_invalid_input);
     tracker_.follow(solution_);
   }
-  report_stop();
+  report_stop(tick);
   measured_.end_without_state(!reference_goes_on);
   if (last_.has_torque) {
     last_.torque = command_.torque;
   }
+  clock_.end_step();
   return command_;
 }
 

@@ -30,7 +30,6 @@ Tracker::Tracker(const Robot& robot, const JointKinds& joints, const ControllerS
       settings_(settings),
       torque_(torque),
       drives_track_(sidestep::drives_track(settings)),
-      frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
       program_(within_margins(robot, settings, 1.0), settings, torque),
       solution_(robot.num_coordinates(), settings.safety.max_rows),
       feedback_(Eigen::VectorXd::Zero(robot.num_coordinates())),
@@ -47,26 +46,32 @@ Tracker::Tracker(const Robot& robot, const JointKinds& joints, const ControllerS
   }
 }
 
-void Tracker::write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q,
+double Tracker::largest_frequency(const Tick& tick) const noexcept {
+  return std::min(settings_.tracking.frequency, most_per_period / tick.period);
+}
+
+void Tracker::write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q, const Tick& tick,
                              Eigen::VectorXd& coupling) const noexcept {
   coupling.setZero();
   if (drives_track_) {
     return;
   }
   // What the arm cannot follow is not run away from.
+  const double w = largest_frequency(tick);
   for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
     const double error = arm_q[j] - reference.q[j], share = is_impedance() ? 1.0 : free_share;
     const double free = share * settings_.tracking.largest_error * (joints_.slides(j) ? prismatic_share : 1.0);
-    coupling[j] = frequency_ * frequency_ * (error - std::clamp(error, -free, free));
+    coupling[j] = w * w * (error - std::clamp(error, -free, free));
   }
 }
 
 bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque,
-                    Reference& reference) const noexcept {
+                    const Tick& tick, Reference& reference) const noexcept {
+  const double w = largest_frequency(tick);
   // By the least change of each joint's torque ω² (M e)_j that is too large, one after the other.
   bool moved = false;
   for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
-    const double most = torque[j] / (frequency_ * frequency_), pushes = mass.col(j).dot(reference.q - arm_q);
+    const double most = torque[j] / (w * w), pushes = mass.col(j).dot(reference.q - arm_q);
     if (std::abs(pushes) > most) {
       reference.q -= (pushes - std::copysign(most, pushes)) / mass.col(j).squaredNorm() * mass.col(j);
       moved = true;
@@ -75,31 +80,35 @@ bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, c
   return moved;
 }
 
-double Tracker::feedback_frequency(const Reference& reference, const Arm& arm) const noexcept {
+double Tracker::feedback_frequency(const Reference& reference, const Arm& arm, const Tick& tick) const noexcept {
   // Under a feedback that asks for more, motors that change their torque slowly would shake: ω³ |M e| and ω² |M de/dt| keep a
   // share of the rate.
-  double w = frequency_;
+  const double lead = tick.lead();
+  double w = largest_frequency(tick);
+  const double share = of_rate * std::min(1.0, tick.torque_period() / tick.period);
   if (torque_) {
     const Eigen::VectorXd& rate = limits_.effort_rate;
     const Eigen::MatrixXd& mass = arm.dynamics.mass();
     for (Eigen::Index j = 0; j < arm.q.size(); ++j) {
       double error = 0.0, change = 0.0;
       for (Eigen::Index k = 0; k < arm.q.size(); ++k) {
-        error += mass(j, k) * (reference.q[k] - arm.q[k]);
+        error += mass(j, k) * (reference.q[k] - lead * reference.v[k] - arm.q[k]);
         change += mass(j, k) * (reference.v[k] - arm.v[k]);
       }
-      w = std::min({w, std::cbrt(of_rate * rate[j] / std::abs(error)), std::sqrt(of_rate * rate[j] / std::abs(change))});
+      w = std::min({w, std::cbrt(share * rate[j] / std::abs(error)), std::sqrt(share * rate[j] / std::abs(change))});
     }
   }
   return w;
 }
 
-TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double tracking_error, TorqueStatus decided) noexcept {
+TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double tracking_error, TorqueStatus decided,
+                            const Tick& tick) noexcept {
   if (is_impedance()) {
-    write_impedance(reference, arm);
+    write_impedance(reference, arm, tick);
   } else {
-    const double w = feedback_frequency(reference, arm);
-    feedback_ = reference.a + w * w * (reference.q - arm.q) + 2.0 * settings_.tracking.damping * w * (reference.v - arm.v);
+    const double w = feedback_frequency(reference, arm, tick);
+    feedback_ = reference.a + w * w * (reference.q - tick.lead() * reference.v - arm.q) +
+                2.0 * settings_.tracking.damping * w * (reference.v - arm.v);
   }
   // The reference's acceleration meets the clearances of the arm too, as far as possible. They are asked again where feedback wants
   // something else, for no more than that acceleration gives them; and where one is lost, which the torque's rate gives way to.
@@ -113,11 +122,12 @@ TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double t
     last = near_last(arm.last.acceleration, arm.last.has_torque ? &arm.last.torque : nullptr, arm.dynamics, factor, false);
   }
   last.decided = &reference.a;
-  const TorqueStatus status = program_.solve(arm.q, arm.v, feedback_, arm.dynamics, clearances, {}, last, solution_, arm.speed);
+  const TorqueStatus status =
+      program_.solve(arm.q, arm.v, feedback_, arm.dynamics, clearances, {}, last, tick, solution_, arm.speed);
   return status > TorqueStatus::limited ? std::max(decided, status) : decided;
 }
 
-void Tracker::write_impedance(const Reference& reference, const Arm& arm) noexcept {
+void Tracker::write_impedance(const Reference& reference, const Arm& arm, const Tick& tick) noexcept {
   // M a_r + K e + D de/dt + h is sent, e = q_r − q, with the h of the model: limits and clearances know of the disturbance d, which is
   // in the bias by now, the impedance does not make up for it. With M = L Lᵀ and L⁻¹ K L⁻ᵀ = U Λ Uᵀ the damping of all modes is ζ if
   // D = 2ζ L U √Λ Uᵀ Lᵀ.
@@ -132,7 +142,8 @@ void Tracker::write_impedance(const Reference& reference, const Arm& arm) noexce
   for (Eigen::Index j = 0; j < n; ++j) {
     const double scale = joints_.slides(j) ? 1.0 / prismatic_share : 1.0;
     K[j] = scale * settings_.tracking.stiffness * limits_.effort[j];
-    force[j] = K[j] * (reference.q[j] - arm.q[j]) + (observer ? observer->disturbance()[j] : 0.0);
+    force[j] =
+        K[j] * (reference.q[j] - tick.lead() * reference.v[j] - arm.q[j]) + (observer ? observer->disturbance()[j] : 0.0);
   }
   const Small L = mass_cholesky_;
   const auto lower = L.triangularView<Eigen::Lower>();
@@ -148,14 +159,15 @@ void Tracker::write_impedance(const Reference& reference, const Arm& arm) noexce
   feedback_ += force;
 }
 
-bool Tracker::keep_torque_rate(const LastOutput& last, const ArmDynamics& dynamics, Eigen::VectorXd& torque) noexcept {
+bool Tracker::keep_torque_rate(const LastOutput& last, const ArmDynamics& dynamics, const Tick& tick,
+                               Eigen::VectorXd& torque) noexcept {
   if (!last.has_torque) {
     return false;
   }
   bool kept = true;
   feedback_.setZero();
   for (Eigen::Index j = 0; j < torque.size(); ++j) {
-    const double step = limits_.effort_rate[j] * settings_.period, change = torque[j] - last.torque[j];
+    const double step = limits_.effort_rate[j] * tick.torque_period(), change = torque[j] - last.torque[j];
     if (std::abs(change) > step * (1.0 + rate_rounding)) {
       kept = false;
       feedback_[j] = std::copysign(step, change) - change;
@@ -169,10 +181,10 @@ bool Tracker::keep_torque_rate(const LastOutput& last, const ArmDynamics& dynami
   return !kept;
 }
 
-void Tracker::write_velocity(const Reference& reference, const Eigen::VectorXd& arm_q, bool known,
+void Tracker::write_velocity(const Reference& reference, const Eigen::VectorXd& arm_q, bool known, const Tick& tick,
                              Eigen::VectorXd& velocity) noexcept {
   for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
-    const double last = reference.v[j] + drift_[j], step = limits_.acceleration[j] * settings_.period;
+    const double last = reference.v[j] + drift_[j], step = limits_.acceleration[j] * tick.period;
     const double most = std::max(limits_.velocity[j], std::abs(reference.next_v[j]));
     const double wanted = reference.next_v[j] + (known ? settings_.tracking.drift_gain * (reference.q[j] - arm_q[j]) : 0.0);
     velocity[j] = std::clamp(std::clamp(wanted, last - step, last + step), -most, most);

@@ -84,8 +84,8 @@ double TrajectoryFollower::starting_rate(const JointTrajectory& path, double s, 
 }
 
 bool TrajectoryFollower::follow(const TrajectoryRequest& request, double age, double pace, const Reference& reference,
-                                const Obstacles& obstacles, InputTarget& target) noexcept {
-  run_clock(request, age, pace, reference, obstacles);
+                                const Obstacles& obstacles, const Tick& tick, InputTarget& target) noexcept {
+  run_clock(request, age, pace, reference, obstacles, tick);
   JointGoal& motion = target.joint_motion();
   motion.position = path_q;
   motion.velocity = clock.rate * path_v;
@@ -101,7 +101,7 @@ bool TrajectoryFollower::follow(const TrajectoryRequest& request, double age, do
   for (Eigen::Index j = 0; j < path_q.size(); ++j) {
     const double error = path_q[j] - reference.q[j];
     const double back = std::min(0.5 * w * std::abs(error), std::sqrt(usable_.acceleration[j] * std::abs(error)));
-    const double ahead = motion.velocity[j] - 0.5 * settings_.period * motion.acceleration[j];
+    const double ahead = motion.velocity[j] - 0.5 * tick.period * motion.acceleration[j];
     velocity_[j] = std::clamp(ahead + std::copysign(back, error), -usable_.velocity[j], usable_.velocity[j]);
     acceleration_[j] = motion.acceleration[j] + 2.0 * w * (velocity_[j] - reference.v[j]);
   }
@@ -111,11 +111,11 @@ bool TrajectoryFollower::follow(const TrajectoryRequest& request, double age, do
 }
 
 void TrajectoryFollower::run_clock(const TrajectoryRequest& request, double age, double pace, const Reference& reference,
-                                   const Obstacles& obstacles) noexcept {
-  const double T = settings_.period;
+                                   const Obstacles& obstacles, const Tick& tick) noexcept {
+  const double T = tick.held;
   const JointTrajectory& path = request.path;
   TrajectoryClock& c = clock;
-  // On to now, as the last period said.
+  // On to now, as the last step said.
   const bool leads = path.stands_at_first() && c.time < path.first();
   c.time = std::min(path.duration(), c.time + std::max(0.0, T * c.rate + 0.5 * T * T * c.change));
   c.rate = std::clamp(c.rate + T * c.change, 0.0, 1.0);
@@ -143,7 +143,7 @@ void TrajectoryFollower::run_clock(const TrajectoryRequest& request, double age,
       rate = std::min(rate, std::sqrt(2.0 * braking_share * most.change * std::max(0.0, left)));
     }
   }
-  set_change(rate, most);
+  set_change(rate, most, tick.period);
 }
 
 TrajectoryFollower::Agility TrajectoryFollower::agility(const Eigen::VectorXd& q) const noexcept {
@@ -159,8 +159,7 @@ TrajectoryFollower::Agility TrajectoryFollower::agility(const Eigen::VectorXd& q
   return most;
 }
 
-void TrajectoryFollower::set_change(double allowed, const Agility& most) noexcept {
-  const double T = settings_.period;
+void TrajectoryFollower::set_change(double allowed, const Agility& most, double T) noexcept {
   TrajectoryClock& c = clock;
   c.allowed = allowed;
   const double left = allowed - c.rate;

@@ -44,7 +44,7 @@ class TrajectoryFollower : private TrajectoryMemory {
   /// Writes to `target` what the request, `age` [s] old, asks of the reference; false once a trajectory that steers has ended: its
   /// end is a goal like others from then on. `pace`: share of the rate, in [0, 1].
   bool follow(const TrajectoryRequest& request, double age, double pace, const Reference& reference, const Obstacles& obstacles,
-              InputTarget& target) noexcept;
+              const Tick& tick, InputTarget& target) noexcept;
   /// The motion begins anew: the trajectory goes on from where its clock is.
   void begin_anew() noexcept;
   /// Where the reference is beside the trajectory: largest deviation of a joint [rad | m].
@@ -70,13 +70,13 @@ class TrajectoryFollower : private TrajectoryMemory {
   /// The rate at which the reference moves along the path at s already, or which it has at once.
   double starting_rate(const JointTrajectory& path, double s, const Eigen::VectorXd& v) noexcept;
   void run_clock(const TrajectoryRequest& request, double age, double pace, const Reference& reference,
-                 const Obstacles& obstacles) noexcept;
+                 const Obstacles& obstacles, const Tick& tick) noexcept;
   /// Largest change of the rate [1/s], of that change [1/s²], and largest lag of a joint [rad].
   struct Agility {
     double change, change_rate, lag;
   };
   Agility agility(const Eigen::VectorXd& q) const noexcept;
-  void set_change(double allowed, const Agility& agility) noexcept;
+  void set_change(double allowed, const Agility& agility, double period) noexcept;
   /// Looks at the path up to `window` [s] ahead, some places in each step; `first`: the step that takes the request.
   void look_along(const JointTrajectory& path, double window, bool first, const Obstacles& obstacles) noexcept;
   /// The last place, in steps from `begin` up to `end` [s], up to which no point of the arm moves by as much as `distance_left` [m].

@@ -37,7 +37,7 @@ void VelocityFollower::begin(const Request& request, const NearReference& near) 
 }
 
 void VelocityFollower::follow(const Request& request, bool fresh, double pace, const Reference& reference,
-                              const NearReference& near, InputTarget& target) noexcept {
+                              const NearReference& near, const Tick& tick, InputTarget& target) noexcept {
   const auto* const twist = std::get_if<TwistRequest>(&request);
   twist_.update(reference.q, reference.v);
   bounds_.begin();
@@ -63,19 +63,19 @@ void VelocityFollower::follow(const Request& request, bool fresh, double pace, c
     ideal = reference.v;
     has_ideal = true;
   }
-  respond(ideal);
-  ideal += settings_.period * response;
-  respond(reference.v);
+  respond(ideal, tick);
+  ideal += tick.period * response;
+  respond(reference.v, tick);
   target.respond(reference, response);
   last_wanted = wanted;
   has_last_wanted = twist != nullptr && fresh;
 }
 
 // Limits scale it as a whole: joints that reach their velocities one after the other would move the arm across what is asked.
-void VelocityFollower::respond(const Eigen::VectorXd& v) noexcept {
+void VelocityFollower::respond(const Eigen::VectorXd& v, const Tick& tick) noexcept {
   response = settings_.inputs.response * (wanted - v);
   if (has_last_wanted) {  // its own change, while the request is the same
-    response += ((wanted - last_wanted) / settings_.period).cwiseMax(-usable_.acceleration).cwiseMin(usable_.acceleration);
+    response += ((wanted - last_wanted) / tick.moved).cwiseMax(-usable_.acceleration).cwiseMin(usable_.acceleration);
   }
   double share = 1.0;
   for (Eigen::Index j = 0; j < v.size(); ++j) {
@@ -124,14 +124,14 @@ void VelocityFollower::write_change(const Request& request, const Eigen::VectorX
   }
 }
 
-bool VelocityFollower::judge(const Request& request, const Reference& reference,
-                             const Eigen::VectorXd& wanted_acceleration) noexcept {
+bool VelocityFollower::judge(const Request& request, const Reference& reference, const Eigen::VectorXd& wanted_acceleration,
+                             const Tick& tick) noexcept {
   // Off what the response alone would make of it: where that is there already, or by itself beyond the tolerance.
   off_ = reference.next_v - ideal;
   const bool is_off = !follows(request, reference.next_v) && (follows(request, ideal) || differs(request, off_, 1.0));
   off_ = (wanted_acceleration - response) / settings_.inputs.response;
   is_bent = is_off && differs(request, off_, bent_share);
-  missed_for = is_off ? missed_for + settings_.period : 0.0;
+  missed_for = is_off ? missed_for + tick.moved : 0.0;
   return is_bent || !follows(request, wanted) || misses_for_long();
 }
 

@@ -34,7 +34,7 @@ class VelocityFollower : private VelocityMemory {
   /// Writes to `target` what the request asks of the reference. An old request (`fresh` false) asks for rest.
   /// `pace`: share of the velocity, in [0, 1].
   void follow(const Request& request, bool fresh, double pace, const Reference& reference, const NearReference& near,
-              InputTarget& target) noexcept;
+              const Tick& tick, InputTarget& target) noexcept;
   /// Something else is followed from now on.
   void end() noexcept { has_last_wanted = false; }
   /// The motion begins anew.
@@ -46,7 +46,8 @@ class VelocityFollower : private VelocityMemory {
   }
   /// Judges the reference's next velocity, whose acceleration barriers make `wanted_acceleration`: true where less is done than
   /// asked.
-  bool judge(const Request& request, const Reference& reference, const Eigen::VectorXd& wanted_acceleration) noexcept;
+  bool judge(const Request& request, const Reference& reference, const Eigen::VectorXd& wanted_acceleration,
+             const Tick& tick) noexcept;
   /// Solves a twist that was not followed in this step, to compare with it.
   void solve_again(const TwistRequest& twist, const Reference& reference, const NearReference& near) noexcept;
   /// Writes what is changed of the request, see Command::input_change.
@@ -66,7 +67,7 @@ class VelocityFollower : private VelocityMemory {
 
  private:
   /// Writes with which acceleration v goes to the wanted velocity.
-  void respond(const Eigen::VectorXd& v) noexcept;
+  void respond(const Eigen::VectorXd& v, const Tick& tick) noexcept;
   /// Whether that change of velocity is more than a share of the tolerance of what was asked for.
   bool differs(const Request& request, const Eigen::VectorXd& change, double share) const noexcept;
 

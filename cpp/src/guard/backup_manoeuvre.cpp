@@ -19,14 +19,13 @@ constexpr int pause = 16;                 // Periods without a search after one 
 
 }  // namespace
 
-BackupManoeuvre::BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period)
+BackupManoeuvre::BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin)
     : body_(body),
       workspace_(body),
       limits_(limits),
       slowed_(limits),
       floor_(of_margin * margin),
       spacing_(std::max(floor_, least_spacing)),
-      period_(period),
       stop_(body.robot().num_coordinates()),
       next_stop_(stop_),
       next_q_(Eigen::VectorXd::Zero(body.robot().num_coordinates())),
@@ -53,15 +52,20 @@ void BackupManoeuvre::invalidate() noexcept {
   rechecking_ = CheckedPlaces::capacity / CheckedPlaces::rechecks_per_step;
 }
 
-bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
-                           const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
+bool BackupManoeuvre::keep(const GuardedMotion& now, const Obstacles& obstacles, const StopTorque* torque,
+                           Eigen::VectorXd& a) noexcept {
+  const auto& [q, v, last, period, as_expected] = now;
   places_.begin_step();
   rechecking_ = std::max(0, rechecking_ - 1);
-  const double share = smooth_share(last, a);
+  const double share = smooth_share(now, a);
   pause_ = std::max(0, pause_ - 1);
   if (pause_ > 0) {
     known_ = false;
     return false;
+  }
+  if (known_ && (!as_expected || period != stop_.period())) {
+    known_ = false;
+    find_stop(now, obstacles, torque);
   }
   const bool rises = known_ && low_;
   if (rises) {
@@ -74,13 +78,14 @@ bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
   if (share == 1.0) {
     next_a_ = a;
   }
-  next_v_ = v + period_ * next_a_;
-  next_q_ = q + period_ * next_v_;
-  bool found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
+  next_v_ = v + period * next_a_;
+  next_q_ = q + period * next_v_;
+  const GuardedMotion next{next_q_, next_v_, next_a_, period};
+  bool found = find_stop(next, obstacles, torque);
   if (!found && rises) {  // The known stop was free above the previous floors.
     floors_ = last_floors_;
     low_ = true;
-    found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
+    found = find_stop(next, obstacles, torque);
   }
   if (!found) {
     // A known stop stays valid while nothing changes: checked from another place it may be below a floor, by one spacing at most.
@@ -88,7 +93,7 @@ bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
     // An arm at rest at its floors may move on all the same: the floors are then those of that place.
     const bool leaves = known_ ? stop_.num_periods() <= 0 : share == 1.0;
     if (!leaves) {
-      return stop_instead(q, v, last, obstacles, torque, a);
+      return stop_instead(now, obstacles, torque, a);
     }
     known_ = false;
   }
@@ -98,9 +103,9 @@ bool BackupManoeuvre::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
   return share < 1.0;
 }
 
-bool BackupManoeuvre::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
-                                   const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
-  if (!known_ && !find_stop(q, v, last, obstacles, torque)) {
+bool BackupManoeuvre::stop_instead(const GuardedMotion& now, const Obstacles& obstacles, const StopTorque* torque,
+                                   Eigen::VectorXd& a) noexcept {
+  if (!known_ && !find_stop(now, obstacles, torque)) {
     pause_ = torque != nullptr ? pause : 0;
     return false;
   }
@@ -114,13 +119,14 @@ bool BackupManoeuvre::stop_instead(const Eigen::VectorXd& q, const Eigen::Vector
   return true;
 }
 
-double BackupManoeuvre::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
+double BackupManoeuvre::smooth_share(const GuardedMotion& now, const Eigen::VectorXd& a) const noexcept {
+  const Eigen::VectorXd& last = now.last;
   double share = 1.0;
   for (Eigen::Index j = 0; j < a.size(); ++j) {
     const double change = a[j] - last[j], tolerance = limit_rounding * (1.0 + std::abs(a[j]));
     const double most = limits_.acceleration[j];
-    if (std::abs(change) > limits_.jerk[j] * period_ + tolerance) {
-      share = std::min(share, limits_.jerk[j] * period_ / std::abs(change));
+    if (std::abs(change) > limits_.jerk[j] * now.period + tolerance) {
+      share = std::min(share, limits_.jerk[j] * now.period / std::abs(change));
     }
     if (std::abs(a[j]) > most + tolerance) {
       share = std::min(share, std::max(0.0, (most - std::copysign(last[j], change * last[j])) / std::abs(change)));
@@ -134,15 +140,14 @@ bool BackupManoeuvre::is_within_effort(const Eigen::VectorXd& a, const StopTorqu
   return (force_.array().abs() <= limits_.effort.array()).all();
 }
 
-bool BackupManoeuvre::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
-                           const StopTorque* torque) noexcept {
+bool BackupManoeuvre::plan(const GuardedMotion& from, const StopTorque* torque) noexcept {
   if (torque == nullptr) {
-    return next_stop_.plan(q, v, a, limits_, period_, jerk_of_stops);
+    return next_stop_.plan(from.q, from.v, from.last, limits_, from.period, jerk_of_stops);
   }
   // A slower stop takes less torque.
   slowed_.acceleration = limits_.acceleration;
   for (int k = 0; k < slower_stops; ++k) {
-    if (!next_stop_.plan(q, v, a, slowed_, period_, jerk_of_stops * torque->jerk_share)) {
+    if (!next_stop_.plan(from.q, from.v, from.last, slowed_, from.period, jerk_of_stops * torque->jerk_share)) {
       return false;
     }
     if (is_within_effort(next_stop_.hardest(), *torque)) {
@@ -153,9 +158,8 @@ bool BackupManoeuvre::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, c
   return false;
 }
 
-bool BackupManoeuvre::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
-                                const Obstacles& obstacles, const StopTorque* torque) noexcept {
-  if (!plan(q, v, a, torque) || !is_free(next_stop_, obstacles)) {
+bool BackupManoeuvre::find_stop(const GuardedMotion& from, const Obstacles& obstacles, const StopTorque* torque) noexcept {
+  if (!plan(from, torque) || !is_free(next_stop_, obstacles)) {
     return false;
   }
   std::swap(stop_, next_stop_);

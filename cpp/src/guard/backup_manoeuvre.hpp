@@ -20,6 +20,15 @@ struct StopTorque {
   void of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noexcept;
 };
 
+/// The motion at the begin of a period.
+struct GuardedMotion {
+  const Eigen::VectorXd& q;     ///< State (nv) [rad | m].
+  const Eigen::VectorXd& v;     ///< Velocity (nv) [/s].
+  const Eigen::VectorXd& last;  ///< Acceleration (nv) [/s²] of the period before.
+  double period;                ///< Length of the coming period [s].
+  bool as_expected = true;      ///< The state is where the last acceleration leads in the last period: else it was held longer.
+};
+
 /// Moves on only after it has verified a collision-free stop within all limits; otherwise it takes the stop verified before. So
 /// jerk and acceleration limits hold among obstacles at rest: no clearance has to be met by a demand that comes too late.
 ///
@@ -32,8 +41,8 @@ struct StopTorque {
 /// One thread at a time; nothing here allocates after construction.
 class BackupManoeuvre {
  public:
-  /// `body`, which stays; `limits` of the motion; `margin` of clearances [m]; period [s].
-  BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin, double period);
+  /// `body`, which stays; `limits` of the motion; `margin` of clearances [m].
+  BackupManoeuvre(const ClearanceQuery& body, const JointLimits& limits, double margin);
 
   /// Forgets the known stop: the state was not reached by what `keep` returned, or something moves.
   void reset() noexcept {
@@ -45,24 +54,23 @@ class BackupManoeuvre {
 
   /// Replaces the wanted acceleration `a` (nv) [/s²] if no free stop follows it, and returns whether it did.
   ///
-  /// q, v: state; `last`: acceleration of the period before; `torque`: null for motion without torque. If `a` changes faster than
+  /// `torque`: null for motion without torque. If `a` changes faster than
   /// the limits allow, only the allowed share of the change is made. If a free stop follows, that is the result. Otherwise it is
   /// the known stop, or one from here. `a` passes unverified if no stop is known and it is within the limits, if the known stop is
   /// over, and if there is no stop at all.
-  bool keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
-            const StopTorque* torque, Eigen::VectorXd& a) noexcept;
+  /// Where the state is another than expected, or the period changes, the known stop is replaced by one from here.
+  bool keep(const GuardedMotion& now, const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept;
 
  private:
   /// Share of the change from `last` to `a` with which acceleration and jerk keep their limits, in [0, 1].
-  double smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
+  double smooth_share(const GuardedMotion& now, const Eigen::VectorXd& a) const noexcept;
   /// Writes the acceleration of the known stop, or else of one from here; false if there is none.
-  bool stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
-                    const StopTorque* torque, Eigen::VectorXd& a) noexcept;
-  /// Plans a stop from q, v, a; false if none is within the limits.
-  bool plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const StopTorque* torque) noexcept;
+  bool stop_instead(const GuardedMotion& now, const Obstacles& obstacles, const StopTorque* torque,
+                    Eigen::VectorXd& a) noexcept;
+  /// Plans a stop; false if none is within the limits.
+  bool plan(const GuardedMotion& from, const StopTorque* torque) noexcept;
   /// Plans a stop, and takes it as the known one if it is free; false if not.
-  bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
-                 const StopTorque* torque) noexcept;
+  bool find_stop(const GuardedMotion& from, const Obstacles& obstacles, const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
   bool is_free(const StopTrajectory& stop, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
@@ -72,7 +80,6 @@ class BackupManoeuvre {
   const JointLimits limits_;
   JointLimits slowed_;                // Limits with less acceleration.
   const double floor_, spacing_;      // Usual floor [m], and motion between two checks [m].
-  const double period_;               // Period [s].
   StopTrajectory stop_, next_stop_;   // The known stop, from here; one from the end of this period.
   bool known_ = false, low_ = false;  // Whether a stop is known; whether a floor is below the usual one.
   Eigen::VectorXd next_q_, next_v_, next_a_, q_, next_place_, a_, force_;

@@ -77,7 +77,7 @@ bool OnlinePlanner::disturbed(ConstVectorRef q, const Obstacles& obstacles) noex
   return body_.nearest_moving(q, obstacles, foresight, here_) < disturbing;
 }
 
-OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference& reference) noexcept {
+OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference& reference, double most) noexcept {
   reference.velocity.setZero(goal_.size());
   reference.acceleration.setZero(goal_.size());
   reference.places.col(0) = goal_;
@@ -93,7 +93,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
   tell(q, time);
   hear(time);
   const Answer& answer = exchange_.answers.current();
-  lead(answer, q, time, reference);
+  lead(answer, q, std::min(time - last_time_, most), reference);
   last_time_ = time;
 
   if ((q - goal_).cwiseAbs().maxCoeff() < settings_.tolerance) {
@@ -148,7 +148,7 @@ void OnlinePlanner::hear(double time) noexcept {
   takes_ = exchange_.answers.update();
 }
 
-void OnlinePlanner::lead(const Answer& answer, ConstVectorRef q, double time, Reference& reference) noexcept {
+void OnlinePlanner::lead(const Answer& answer, ConstVectorRef q, double duration, Reference& reference) noexcept {
   if (!leads(answer)) {
     reference.position = goal_;
     return;
@@ -159,8 +159,7 @@ void OnlinePlanner::lead(const Answer& answer, ConstVectorRef q, double time, Re
   }
   reference.position.resize(goal_.size());
   const TimedPathSettings& settings = settings_.planner.route;
-  follower_.advance(*answer.route, settings, q, time - last_time_, reference.position, reference.velocity,
-                    reference.acceleration);
+  follower_.advance(*answer.route, settings, q, duration, reference.position, reference.velocity, reference.acceleration);
   if (const Eigen::Index num = follower_.narrow(*answer.route, settings, reference.places); num > 0) {
     reference.num_places = num;
     reference.arrives = answer.route->length() - follower_.station <= settings.lead;

@@ -45,7 +45,8 @@ struct Plant {
     v += observer_period * real.ldlt().solve(torque + disturbance + dry - bias);
     std::uniform_real_distribution<double> error(-noise, noise);
     measured = v + Eigen::Vector2d(error(random), error(random));
-    observer.update(before, measured, torque, wanted, mass, bias);
+    const Eigen::VectorXd predicted = wanted;
+    observer.update({before, measured, torque, predicted, observer_period}, mass, bias);
   }
 };
 
@@ -60,8 +61,16 @@ Eigen::Vector2d swing(int k, double mean) {
 
 }  // namespace
 
+BOOST_AUTO_TEST_CASE(a_motion_counts_for_as_long_as_it_took) {
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
+  const Eigen::MatrixXd mass = Eigen::Matrix2d::Identity();
+  const Eigen::VectorXd rest = Eigen::Vector2d::Zero(), after = Eigen::Vector2d(0.004, 0.0);  // 1 rad/s² for 4 ms
+  observer.update({rest, after, rest, rest, 0.004}, mass, rest);
+  BOOST_TEST(std::abs(observer.disturbance()[0] - 0.004 / observer_time) < 1e-12);
+}
+
 BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.disturbance << -6.0, 2.0;
   for (int k = 0; k < 30; ++k) {  // T_o
@@ -81,7 +90,7 @@ BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
 }
 
 BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.disturbance << -500.0, 500.0;
   for (int k = 0; k < 500; ++k) {
@@ -93,7 +102,7 @@ BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits)
 
 BOOST_AUTO_TEST_CASE(a_leap_of_the_velocity_is_not_a_disturbance) {
   // As by an impact, or where a simulation starts anew: 1 rad/s within a period would be a force of 2,000 Nm.
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.disturbance << -6.0, 2.0;
   for (int k = 0; k < 3000; ++k) {
@@ -110,12 +119,12 @@ BOOST_AUTO_TEST_CASE(a_leap_of_the_velocity_is_not_a_disturbance) {
 
 BOOST_AUTO_TEST_CASE(what_holds_a_light_joint_is_found) {
   // What is predicted then is a leap, in every period.
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   const Eigen::MatrixXd mass = Eigen::Matrix2d::Identity() * 0.01;
   const Eigen::VectorXd none = Eigen::Vector2d::Zero(), torque = Eigen::Vector2d(8.0, 0.0);
   for (int k = 0; k < 500; ++k) {  // at rest: 8 Nm and a disturbance of -8 Nm
     const Eigen::VectorXd predicted = (torque + observer.disturbance()) / 0.01;
-    observer.update(none, none, torque, predicted, mass, none);
+    observer.update({none, none, torque, predicted, observer_period}, mass, none);
   }
   BOOST_TEST(observer.disturbance()[0] == -8.0, boost::test_tools::tolerance(1e-3));
   BOOST_TEST(observer.disturbance()[1] == 0.0);
@@ -123,7 +132,7 @@ BOOST_AUTO_TEST_CASE(what_holds_a_light_joint_is_found) {
 
 BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {
   for (const double rotor : {0.0, 0.1}) {
-    DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+    DisturbanceObserver observer(limits_of_two(), observer_time, share);
     Plant plant;
     plant.rotors << 0.0, rotor;
     plant.disturbance << 1.0, -0.5;
@@ -136,7 +145,7 @@ BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {
 }
 
 BOOST_AUTO_TEST_CASE(dry_friction_is_not_taken_for_inertia) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.friction << 4.0, 2.0;
   for (int k = 0; k < 6000; ++k) {  // turns back twice in every swing
@@ -147,7 +156,7 @@ BOOST_AUTO_TEST_CASE(dry_friction_is_not_taken_for_inertia) {
 }
 
 BOOST_AUTO_TEST_CASE(a_payload_is_not_taken_for_rotors) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.payload << 0.6, 0.35, 0.35, 0.22;
   for (int k = 0; k < 6000; ++k) {
@@ -158,7 +167,7 @@ BOOST_AUTO_TEST_CASE(a_payload_is_not_taken_for_rotors) {
 }
 
 BOOST_AUTO_TEST_CASE(rotors_are_found_beside_friction_and_noise) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.rotors << 0.0, 0.1;
   plant.friction << 1.0, 1.0;
@@ -175,7 +184,7 @@ BOOST_AUTO_TEST_CASE(rotors_are_found_beside_friction_and_noise) {
 }
 
 BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates) {
-  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_time, share);
   Plant plant;
   plant.disturbance << 2.0, 1.0;
   for (int k = 0; k < 100; ++k) {
@@ -185,14 +194,14 @@ BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates)
   const Eigen::VectorXd good = Eigen::Vector2d(0.1, 0.2), bad = Eigen::Vector2d::Constant(test::not_a_number);
   const Eigen::MatrixXd mass = plant.mass, unknown = Eigen::Matrix2d::Constant(test::not_a_number);
   BOOST_TEST(test::allocations_of([&] {
-               observer.update(good, bad, good, good, mass, good);
-               observer.update(good, good, bad, good, mass, good);
-               observer.update(good, good, good, bad, mass, good);
-               observer.update(good, good, good, good, unknown, good);
-               observer.update(good, good, good, good, mass, bad);
+               observer.update({good, bad, good, good, observer_period}, mass, good);
+               observer.update({good, good, bad, good, observer_period}, mass, good);
+               observer.update({good, good, good, bad, observer_period}, mass, good);
+               observer.update({good, good, good, good, observer_period}, unknown, good);
+               observer.update({good, good, good, good, observer_period}, mass, bad);
              }) == 0u);
   BOOST_TEST((observer.rotors() == rotors));
   BOOST_TEST((observer.disturbance() == disturbance));
-  BOOST_TEST(test::allocations_of([&] { observer.update(good, good, good, good, mass, good); }) == 0u);
+  BOOST_TEST(test::allocations_of([&] { observer.update({good, good, good, good, observer_period}, mass, good); }) == 0u);
   BOOST_TEST((observer.disturbance() != disturbance));
 }

@@ -35,8 +35,9 @@ struct SpeedRows {
   void update(const KinematicState& state, const JointLimits& limits, double limit, double next_limit) noexcept {
     rows.clear();
     const SpeedLimitNow speed{&state, &limits.acceleration, limit, next_limit};
-    constraint.append({speed_period, state.v(), state.v(), nullptr, nullptr, 1.0, false, {}, nullptr, {}, speed, {}}, bounds,
-                      rows);
+    constraint.append(
+        {speed_period, 1.0, speed_period, state.v(), state.v(), nullptr, nullptr, 1.0, false, {}, nullptr, {}, speed, {}},
+        bounds, rows);
   }
   SpeedConstraint constraint;
   RowBlock rows;

@@ -17,7 +17,7 @@ struct Judging {
     set({1, Goal(JointGoal(Eigen::Vector2d(0.5, 0.5)))});
     Goal goal = *request.goal();
     follower.leave(true);
-    follower.begin(goal, false, {reference, reference.q, obstacles, 0.0, 1});
+    follower.begin(goal, false, {reference, reference.q, obstacles, tick, 1});
     measure({0.0, 0.0}, {0.0, 0.0});
   }
   void set(NumberedRequest newest) {
@@ -29,8 +29,9 @@ struct Judging {
     kinematics.update(model.arm.robot(), q, v);
   }
   ActivityJudge::Evidence evidence() {
+    tick.time += judged_period;
     const Goal& destination = request.goal() != nullptr ? *request.goal() : resting;
-    return {request, destination, follower, follower.led_goal(), arm, kinematics, StepStatus::ok, time += judged_period};
+    return {request, destination, follower, follower.led_goal(), arm, kinematics, StepStatus::ok, tick};
   }
   Activity judge() { return judge_.judge(evidence()).activity; }
   /// Steps until that is said; -1: not within a second.
@@ -54,7 +55,7 @@ struct Judging {
   MeasuredState arm{model.arm.robot(), model.joints, model.plausible, model.settings, true};
   KinematicState kinematics{model.arm.robot()};
   ActivityJudge judge_{model.settings, model.joints, model.look_period};
-  double time = 0.0;
+  Tick tick = Tick::regular(judged_period);
 };
 
 }  // namespace
@@ -100,7 +101,7 @@ BOOST_AUTO_TEST_CASE(no_way_has_to_stay_for_a_fifth_of_a_second_before_the_arm_i
   j.judge();
   j.follower.set_target_blocked(true);
   BOOST_TEST(j.steps_until(Activity::blocked) >= 200);
-  j.judge_.forget(j.time);  // another goal
+  j.judge_.forget(j.tick.time);  // another goal
   BOOST_TEST((j.judge() == Activity::moving));
 }
 

@@ -93,12 +93,12 @@ BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_observed_with_its_time_constant_a
   w.dynamics.update(w.leaning, {});
   const Eigen::MatrixXd mass = w.mass_at(w.leaning);
   const Eigen::VectorXd bias = w.bias_at(w.leaning);
-  w.dynamics.observe(true, v, last);
+  w.dynamics.observe(true, v, last, Tick::regular(0.001));
   for (int k = 0; k < 50; ++k) {  // one time constant; what is observed holds the arm, what is not yet moves it
     last.torque = w.dynamics.bias();
     last.acceleration.setZero();
     v += period * mass.inverse() * (last.torque + d - bias);
-    w.dynamics.observe(false, v, last);
+    w.dynamics.observe(false, v, last, Tick::regular(0.001));
     w.dynamics.update(w.leaning, {});
   }
   const double share = 1.0 - std::pow(1.0 - period / time, 50);  // 64 %
@@ -112,8 +112,8 @@ BOOST_AUTO_TEST_CASE(without_an_observer_nothing_is_taken_from_the_bias) {
   Weighing w(settings);
   BOOST_TEST(!w.dynamics.observer().has_value());
   LastOutput last(2);
-  w.dynamics.observe(true, Eigen::Vector2d::Zero(), last);
-  w.dynamics.observe(false, Eigen::Vector2d(0.1, 0.1), last);
+  w.dynamics.observe(true, Eigen::Vector2d::Zero(), last, Tick::regular(0.001));
+  w.dynamics.observe(false, Eigen::Vector2d(0.1, 0.1), last, Tick::regular(0.001));
   w.dynamics.update(w.leaning, {});
   BOOST_TEST((w.dynamics.bias() == w.bias_at(w.leaning)));
 }

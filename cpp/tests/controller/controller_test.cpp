@@ -83,7 +83,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_everything_on_and_orders_from
           .join();
     }
     count += test::allocations_of([&] {
-      const Command& command = controller.step(q, v);
+      const Command& command = controller.step(q, v, period * k);
       on_path = on_path || command.on_path;
       waited = waited || command.activity == Activity::waiting;
       avoided = avoided || command.avoiding;

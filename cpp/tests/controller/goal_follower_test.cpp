@@ -16,13 +16,17 @@ namespace {
 struct Leading {
   explicit Leading(JointLimits limits = test::arm_limits(nv))
       : model(test::covered_arm(std::move(limits)), test::straight_settings(Output::position)) {}
-  GoalFollower::Moment now(double time = 0.0) const { return {reference, reference.q, obstacles, time, 1}; }
+  GoalFollower::Moment now(double time = 0.0) {
+    tick.time = time;
+    return {reference, reference.q, obstacles, tick, 1};
+  }
 
   const ControllerModel model;
   const Obstacles obstacles = Obstacles::none();
   RequestBoard board{nv};
   GoalFollower follower{model.body, model.settings, model.joints, model.dynamics, board, false};
   Reference reference{nv};
+  Tick tick = Tick::regular(0.001);
 };
 
 const Eigen::VectorXd led_to = (Eigen::VectorXd(nv) << 0.4, 0.5, 0.3, 0.9, -0.2, 0.6, 0.4).finished();
@@ -100,7 +104,8 @@ BOOST_AUTO_TEST_CASE(a_worker_is_asked_once_for_a_posture_and_its_answer_to_anot
   GoalFollower follower(model.body, model.settings, model.joints, model.dynamics, board, false);
   const Reference reference(nv);
   const Obstacles obstacles = Obstacles::none();
-  const GoalFollower::Moment now{reference, reference.q, obstacles, 0.0, 1};
+  const Tick tick = Tick::regular(0.001);
+  const GoalFollower::Moment now{reference, reference.q, obstacles, tick, 1};
   const PoseGoal pose = test::pose_of(model.arm.robot(), led_to);
   Goal goal = pose;
   follower.begin(goal, false, now);

@@ -23,6 +23,7 @@ struct Programming {
   ArmDynamics dynamics;
   JointProgram program;
   TorqueSolution solution{2};
+  const Tick tick = Tick::regular(0.001);
   const Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), v = Eigen::Vector2d::Zero();
 };
 
@@ -47,22 +48,34 @@ BOOST_AUTO_TEST_CASE(margins_leave_a_share_of_every_limit_but_position) {
 BOOST_AUTO_TEST_CASE(an_acceleration_within_limits_is_given_as_wanted_and_one_beyond_is_cut) {
   Programming p(Output::position);
   const Eigen::VectorXd wanted = Eigen::Vector2d(5.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.solution) == TorqueStatus::ok));
+  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::ok));
   BOOST_TEST((p.solution.acceleration - wanted).norm() < programmed);
   const Eigen::VectorXd much = Eigen::Vector2d(50.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, much, p.dynamics, nullptr, {}, {}, p.solution) == TorqueStatus::limited));
+  BOOST_TEST((p.program.solve(p.q, p.v, much, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::limited));
   BOOST_TEST((p.solution.acceleration - Eigen::Vector2d(9.8, -3.0)).norm() < programmed);
   const Eigen::VectorXd last = Eigen::Vector2d(0.0, 0.0);  // jerk: 1000 rad/s³ less 2 %
-  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {&last}, p.solution) == TorqueStatus::limited));
+  BOOST_TEST(
+      (p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {&last}, p.tick, p.solution) == TorqueStatus::limited));
   BOOST_TEST((p.solution.acceleration - Eigen::Vector2d(0.98, -0.98)).norm() < programmed);
-  BOOST_TEST(p.program.jerk_share() == 1.0);
+  BOOST_TEST(p.program.jerk_share(p.tick) == 1.0);
+}
+
+BOOST_AUTO_TEST_CASE(bounds_are_those_of_the_period_that_comes) {
+  Programming p(Output::position);
+  const Eigen::VectorXd last = Eigen::Vector2d::Zero(), wanted = Eigen::Vector2d(5.0, -3.0), fast = Eigen::Vector2d(2.44, 0.0);
+  Tick slow = Tick::regular(0.004);
+  slow.told = 0.001;
+  static_cast<void>(p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {&last}, slow, p.solution));
+  BOOST_TEST((p.solution.acceleration - Eigen::Vector2d(3.92, -3.0)).norm() < programmed);  // 980 rad/s³ for 4 ms
+  static_cast<void>(p.program.solve(p.q, fast, wanted, p.dynamics, nullptr, {}, {}, slow, p.solution));
+  BOOST_TEST(std::abs(fast[0] + 0.004 * p.solution.acceleration[0] - 2.45) < programmed);  // the velocity limit, not beyond
 }
 
 BOOST_AUTO_TEST_CASE(a_torque_is_that_of_the_acceleration_by_the_dynamics) {
   Programming p(Output::torque);
   p.dynamics.update(test::state_at(p.model.arm.robot(), p.q), {});
   const Eigen::VectorXd wanted = Eigen::Vector2d(5.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.solution) == TorqueStatus::ok));
+  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::ok));
   // The price of torque costs tracking of about 1e-8 rad/s², see MotionProgramSettings.
   BOOST_TEST((p.solution.acceleration - wanted).norm() < 1e-7);
   const Eigen::VectorXd torque = p.dynamics.mass() * p.solution.acceleration + p.dynamics.bias();
@@ -73,8 +86,8 @@ BOOST_AUTO_TEST_CASE(an_arm_whose_state_is_unusable_is_stopped_with_the_torque_t
   Programming p(Output::torque);
   p.dynamics.update(test::state_at(p.model.arm.robot(), p.q), {});
   const Eigen::VectorXd unknown = Eigen::VectorXd::Constant(2, test::not_a_number), rest = Eigen::VectorXd::Zero(2);
-  BOOST_TEST(
-      (p.program.stop(unknown, unknown, rest, {}, p.dynamics, nullptr, p.solution) == TorqueStatus::fallback_invalid_input));
+  BOOST_TEST((p.program.stop(unknown, unknown, rest, {}, p.dynamics, nullptr, p.tick, p.solution) ==
+              TorqueStatus::fallback_invalid_input));
   BOOST_TEST((p.solution.fault == TorqueFault::position));
   BOOST_TEST((p.solution.torque - p.dynamics.bias()).norm() < programmed);  // gravity: no velocity is known to be damped
   const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(2, 2);
@@ -82,8 +95,8 @@ BOOST_AUTO_TEST_CASE(an_arm_whose_state_is_unusable_is_stopped_with_the_torque_t
   const Eigen::Ref<const Eigen::MatrixXd> told_mass(mass);
   const Eigen::Ref<const Eigen::VectorXd> told_bias(bias);
   const ToldDynamics told{&told_mass, &told_bias};
-  BOOST_TEST(
-      (p.program.stop(unknown, unknown, rest, told, p.dynamics, nullptr, p.solution) == TorqueStatus::fallback_invalid_input));
+  BOOST_TEST((p.program.stop(unknown, unknown, rest, told, p.dynamics, nullptr, p.tick, p.solution) ==
+              TorqueStatus::fallback_invalid_input));
   BOOST_TEST((p.solution.torque - bias).norm() < programmed);
 }
 

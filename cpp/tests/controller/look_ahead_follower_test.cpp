@@ -30,11 +30,11 @@ struct Avoiding {
 BOOST_AUTO_TEST_CASE(a_trajectory_that_was_found_is_followed_from_its_delay_on_moved_on_by_what_it_is_late) {
   Avoiding a;
   BOOST_TEST(a.follower.is_on());
-  BOOST_TEST((a.follower.follow(0.05) == nullptr));
+  BOOST_TEST((a.follower.follow(Tick::regular(0.001, 0.05)) == nullptr));
   a.follower.buffer().put(a.found(0.05, true));
-  BOOST_TEST((a.follower.follow(0.06) != nullptr));
+  BOOST_TEST((a.follower.follow(Tick::regular(0.001, 0.06)) != nullptr));
   BOOST_TEST(!a.follower.is_followed());
-  BOOST_TEST((a.follower.follow(0.153) == nullptr));  // 3 periods late
+  BOOST_TEST((a.follower.follow(Tick::regular(0.001, 0.153)) == nullptr));  // 3 periods late
   BOOST_TEST(a.follower.is_followed());
   BOOST_TEST((std::get<JointGoal>(a.follower.target()).position == a.end));
   AvoidanceTrajectory expected = a.aside;
@@ -42,13 +42,13 @@ BOOST_AUTO_TEST_CASE(a_trajectory_that_was_found_is_followed_from_its_delay_on_m
     expected.advance(a.model.settings.period);
   }
   BOOST_TEST((a.follower.followed().position() == expected.position()));
-  a.follower.follow(0.154);
+  a.follower.follow(Tick::regular(0.001, 0.154));
   expected.advance(a.model.settings.period);
   BOOST_TEST((a.follower.followed().position() == expected.position()));
   a.follower.buffer().put(a.found(0.1, false));  // the goal's own way is free again
-  a.follower.follow(0.199);
+  a.follower.follow(Tick::regular(0.001, 0.199));
   BOOST_TEST(a.follower.is_followed());
-  a.follower.follow(0.2);
+  a.follower.follow(Tick::regular(0.001, 0.2));
   BOOST_TEST(!a.follower.is_followed());
 }
 
@@ -56,7 +56,7 @@ BOOST_AUTO_TEST_CASE(the_age_of_a_look_slows_the_arm_beside_what_moves_and_nowhe
   Avoiding a;
   const LookAheadSettings& look = *a.model.settings.look_ahead;
   a.follower.buffer().put(a.found(1.0, false, 0.25));
-  a.follower.follow(1.1);  // it took 0.15 s more by the machine's clock than the steps since
+  a.follower.follow(Tick::regular(0.001, 1.1));  // it took 0.15 s more by the machine's clock than the steps since
   a.follower.judge_age(1.5, true);
   BOOST_TEST(std::abs(a.follower.age() - 0.65) < 1e-14);          // rounding near 1
   BOOST_TEST(std::abs(a.follower.current_pace() - 0.5) < 1e-14);  // half way from 3 delays to 10
@@ -66,7 +66,7 @@ BOOST_AUTO_TEST_CASE(the_age_of_a_look_slows_the_arm_beside_what_moves_and_nowhe
   a.follower.judge_age(1.5, false);
   BOOST_TEST(a.follower.current_pace() == 1.0);
   a.follower.buffer().put(a.found(1.5, true));
-  a.follower.follow(1.6);
+  a.follower.follow(Tick::regular(0.001, 1.6));
   a.follower.judge_age(2.5, true);  // the way out of the way is not slowed
   BOOST_TEST(a.follower.current_pace() == 1.0);
   a.follower.begin_anew();

@@ -22,9 +22,7 @@ struct Measuring {
         robot(test::serial_arm(std::move(limits))),
         joints(robot),
         plausible(robot, Eigen::Vector2d::Ones()),
-        state(robot, joints, plausible, settings, output == Output::position) {
-    state.give_elapsed(measured_period);  // in place of the machine's clock
-  }
+        state(robot, joints, plausible, settings, output == Output::position) {}
 
   /// A step whose sample is q, v, of an arm that was commanded to be at `commanded` now.
   bool step(const Eigen::Vector2d& q, const Eigen::Vector2d& v, const Eigen::Vector2d& commanded,
@@ -33,7 +31,9 @@ struct Measuring {
       state.end_without_state(false);
       return false;
     }
-    state.judge(commanded, acceleration, time += measured_period);
+    time += measured_period;
+    tick.time = time;
+    state.judge(commanded, acceleration, tick);
     began = state.begins();
     state.begun();
     state.compare(commanded);
@@ -50,6 +50,7 @@ struct Measuring {
   Plausibility plausible;
   MeasuredState state;
   double time = 0.0;
+  Tick tick = Tick::regular(measured_period);
   bool began = false;
 };
 
@@ -79,6 +80,24 @@ BOOST_AUTO_TEST_CASE(a_sample_that_no_motion_explains_is_bridged_by_the_predicti
   BOOST_TEST(m.state.agrees_with_reference());
 }
 
+BOOST_AUTO_TEST_CASE(a_late_sample_is_compared_with_what_the_arm_did_meanwhile) {
+  Measuring late(Output::acceleration), on_time(Output::acceleration);
+  const Eigen::Vector2d v(2.0, 0.0), a(1.0, 0.0);
+  late.step(here, v, here);
+  late.tick.elapsed = late.tick.moved = 0.02;
+  const Eigen::Vector2d moved = 0.02 * v;
+  late.step(moved, v, moved);
+  BOOST_TEST(!late.state.bridges_sample());
+  BOOST_TEST(late.is_at(moved, v));
+  late.step(elsewhere, v, 2.0 * moved, a);
+  BOOST_TEST(late.state.bridges_sample());
+  const Eigen::Vector2d next = v + 0.02 * a;
+  BOOST_TEST(late.is_at(moved + 0.02 * next, next));
+  on_time.step(here, v, here);
+  on_time.step(moved, v, 0.001 * v);  // 38 mrad in a millisecond
+  BOOST_TEST(on_time.state.bridges_sample());
+}
+
 BOOST_AUTO_TEST_CASE(five_samples_in_a_row_that_disagree_begin_the_motion_anew_and_fewer_do_not) {
   Measuring m(Output::acceleration);
   m.step(here, rests, here);
@@ -99,10 +118,10 @@ BOOST_AUTO_TEST_CASE(five_samples_in_a_row_that_disagree_begin_the_motion_anew_a
 BOOST_AUTO_TEST_CASE(one_sample_that_disagrees_is_enough_after_a_pause_or_a_sample_without_numbers) {
   Measuring m(Output::acceleration);
   m.step(here, rests, here);
-  m.state.give_elapsed(0.101);  // longer than any loop is late
+  m.tick.pauses = true;
   m.step(elsewhere, rests, here);
   BOOST_TEST(m.began);
-  m.state.give_elapsed(measured_period);
+  m.tick.pauses = false;
   BOOST_TEST(!m.step({test::not_a_number, 0.0}, rests, elsewhere));
   m.step(here, rests, elsewhere);
   BOOST_TEST(m.began);
@@ -138,9 +157,9 @@ BOOST_AUTO_TEST_CASE(a_velocity_that_leaps_alone_is_replaced_until_it_has_stayed
     BOOST_TEST(m.is_at(here, rests));
   }
   BOOST_TEST(m.state.take(here, Eigen::Vector2d(0.55, 0.0)));
-  m.state.judge(here, rests, 0.006);
+  m.state.judge(here, rests, m.tick);
   BOOST_TEST(m.is_at(here, {0.55, 0.0}));
-  m.state.filter_velocity(rests);
+  m.state.filter_velocity(rests, m.tick);
   BOOST_TEST(m.is_at(here, {0.55, 0.0}));  // once more it is taken as it is
 }
 
@@ -149,8 +168,8 @@ BOOST_AUTO_TEST_CASE(the_filter_takes_a_share_of_what_a_measured_velocity_differ
   m.step(here, {0.1, 0.0}, here);
   BOOST_TEST(m.state.take(here, Eigen::Vector2d(0.13, 0.0)));
   const Eigen::Vector2d a(10.0, 0.0);
-  m.state.judge(here, a, 0.002);
-  m.state.filter_velocity(a);
+  m.state.judge(here, a, m.tick);
+  m.state.filter_velocity(a, m.tick);
   const double share = measured_period / m.settings.tracking.velocity_filter;  // a quarter
   BOOST_TEST(m.is_at(here, {0.11 + share * 0.02, 0.0}));                       // predicted: 0.1 + T 10
 }

@@ -27,6 +27,33 @@ BOOST_AUTO_TEST_CASE(a_reference_integrates_velocity_first_and_then_position) {
   BOOST_TEST((reference.v == reference.next_v));
 }
 
+BOOST_AUTO_TEST_CASE(what_was_commanded_is_held_until_the_next_step_comes) {
+  using Output = ControllerSettings::Output;
+  Reference on_time(2);
+  on_time.q = Eigen::Vector2d(0.1, -0.2);
+  on_time.v = Eigen::Vector2d(0.5, 1.0);
+  on_time.advance(Eigen::Vector2d(10.0, -5.0), false, reference_jerk, reference_period);
+  Tick tick = Tick::regular(reference_period);
+  const auto held = [&](Output output) {
+    Reference reference = on_time;
+    reference.hold(output, tick);
+    return reference;
+  };
+  BOOST_TEST((held(Output::acceleration).next_q == on_time.next_q));
+  tick.held = 2.0 * reference_period;  // as two steps with the same acceleration
+  Reference twice = on_time;
+  twice.go_on();
+  twice.advance(on_time.a, false, reference_jerk, reference_period);
+  for (const Output output : {Output::acceleration, Output::torque}) {
+    BOOST_TEST((held(output).next_v - twice.next_v).norm() < 1e-15);
+    BOOST_TEST((held(output).next_q - twice.next_q).norm() < 1e-15);
+  }
+  const Reference by_velocity = held(Output::velocity), by_position = held(Output::position);
+  BOOST_TEST((by_velocity.next_v == on_time.next_v));
+  BOOST_TEST((by_velocity.next_q - (on_time.next_q + reference_period * on_time.next_v)).norm() < 1e-15);
+  BOOST_TEST((by_position.next_q == on_time.next_q));
+}
+
 BOOST_AUTO_TEST_CASE(an_acceleration_that_is_not_finite_leaves_the_one_before) {
   Reference reference(2);
   reference.advance(Eigen::Vector2d(1.0, 2.0), false, reference_jerk, reference_period);

@@ -178,7 +178,7 @@ BOOST_AUTO_TEST_CASE(the_limit_is_held_on_a_path_of_the_planner_without_allocati
   int on_path = 0, slowed = 0;
   bool arrived = false;
   for (int k = 0; k < 40000 && !arrived; ++k) {
-    allocations += test::allocations_of([&] { controller.step(q, v); });
+    allocations += test::allocations_of([&] { controller.step(q, v, settings.period * k); });
     const Command& command = controller.command();
     BOOST_REQUIRE(command.speed <= command.speed_limit);
     on_path += command.on_path;

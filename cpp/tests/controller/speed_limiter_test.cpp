@@ -24,7 +24,7 @@ struct Limiting {
   }
   std::optional<double> update(double distance, bool known_before) {
     const Obstacles ball = test::ball({0.04 + distance + 0.1, 0.0, 0.75}, 0.1);  // the link's half width is 0.04 m
-    return limiter.update(resting, moving, upright, ball, known_before, command);
+    return limiter.update(resting, moving, upright, ball, known_before, Tick::regular(0.001), command);
   }
 
   const ControllerModel model;

@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     for (int k = 0; k < 40000 && (k < 2500 || avoided == 0 || on_path == 0); ++k) {  // however slow the machine is
       const bool broken = k % 500 == 250;                                            // a sensor that fails now and then
       const Eigen::VectorXd seen = broken ? Eigen::VectorXd::Constant(nv, test::not_a_number) : q;
-      allocations += test::allocations_of([&] { controller.step(seen, v); });
+      allocations += test::allocations_of([&] { controller.step(seen, v, 0.001 * k); });
       const Command& command = controller.command();
       avoided += command.avoiding;
       on_path += command.on_path;
@@ -146,6 +146,33 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     BOOST_TEST(allocations == 0U);
     BOOST_TEST(avoided > 0U);
     BOOST_TEST(on_path > 0U);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_whatever_time_it_is_told) {
+  using Output = ControllerSettings::Output;
+  for (const auto output : {Output::torque, Output::acceleration, Output::velocity}) {
+    ControllerSettings settings;
+    settings.output = output;
+    settings.planner.reset();
+    settings.look_ahead.reset();
+    Controller controller(covered_arm(test::arm_limits(nv)), settings);
+    controller.set_goal(Eigen::VectorXd::Constant(nv, 0.3));
+    Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.6), v = Eigen::VectorXd::Zero(nv);
+    std::size_t allocations = 0, stops = 0;
+    double time = 0.0;
+    for (int k = 0; k < 300; ++k) {
+      const double period = k % 50 == 49 ? -0.1 : k % 50 == 48 ? 1.0 : k % 3 == 0 ? 0.004 : 0.001;
+      time += period;
+      const double told = k % 7 == 0 ? test::not_a_number : time;
+      allocations += test::allocations_of([&] { controller.step(q, v, told); });
+      stops += controller.command().status == SafetyStatus::stopping;
+      v += 0.001 * controller.command().acceleration;
+      q += 0.001 * v;
+    }
+    BOOST_TEST(allocations == 0U);
+    BOOST_TEST(stops == 5U);  // the second jump back is less than the one forward before it, which was not told
+    BOOST_TEST(controller.command().timing.late_steps > 80);
   }
 }
 

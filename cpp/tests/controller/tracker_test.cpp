@@ -1,5 +1,7 @@
 // Feedback that makes the arm follow its reference, alone.
 #include <boost/test/unit_test.hpp>
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "../../src/controller/tracker.hpp"
@@ -30,7 +32,7 @@ struct Tracking {
   }
   TorqueStatus track(const Reference& reference, TorqueStatus decided = TorqueStatus::ok) {
     const double error = (reference.q - q).cwiseAbs().maxCoeff();
-    return tracker.track(reference, {q, v, seen, dynamics, last, any_speed}, error, decided);
+    return tracker.track(reference, {q, v, seen, dynamics, last, any_speed}, error, decided, tick);
   }
 
   const ControllerModel model;
@@ -39,6 +41,7 @@ struct Tracking {
   Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), v = Eigen::Vector2d(0.1, -0.1);
   const Clearances seen{2, model.system->num_embedding_coordinates()};
   LastOutput last{2};
+  const Tick tick = Tick::regular(model.settings.period);
 };
 
 }  // namespace
@@ -64,11 +67,11 @@ BOOST_AUTO_TEST_CASE(an_arm_that_cannot_follow_draws_the_reference_to_itself_bey
   const Reference reference = test::reference_at(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d::Zero());
   Eigen::VectorXd coupling(2);
   // A fifth of the largest error of 0.2 rad is free.
-  t.tracker.write_coupling(reference, Eigen::Vector2d(0.05, -0.039), coupling);
+  t.tracker.write_coupling(reference, Eigen::Vector2d(0.05, -0.039), t.tick, coupling);
   BOOST_TEST((coupling - Eigen::Vector2d(3600.0 * 0.01, 0.0)).norm() < 1e-11);  // rounding of 60² times 1e-15
-  t.tracker.write_coupling(reference, Eigen::Vector2d(-0.06, 0.0), coupling);
+  t.tracker.write_coupling(reference, Eigen::Vector2d(-0.06, 0.0), t.tick, coupling);
   BOOST_TEST((coupling - Eigen::Vector2d(-3600.0 * 0.02, 0.0)).norm() < 1e-11);
-  drives.tracker.write_coupling(reference, Eigen::Vector2d(0.5, 0.5), coupling);
+  drives.tracker.write_coupling(reference, Eigen::Vector2d(0.5, 0.5), t.tick, coupling);
   BOOST_TEST(coupling.isZero(0.0));  // its drives track the reference
 }
 
@@ -76,31 +79,44 @@ BOOST_AUTO_TEST_CASE(a_torque_from_elsewhere_keeps_its_rate_and_the_acceleration
   Tracking t(Output::torque, 1000.0);  // 1 Nm in a period
   t.last.torque = Eigen::Vector2d(5.0, 5.0);
   Eigen::VectorXd torque = Eigen::Vector2d(8.0, 4.5);
-  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, torque));  // there was none before
+  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, t.tick, torque));  // there was none before
   t.last.has_torque = true;
   t.tracker.solution().acceleration = Eigen::Vector2d(1.0, 2.0);
-  BOOST_TEST(t.tracker.keep_torque_rate(t.last, t.dynamics, torque));
+  BOOST_TEST(t.tracker.keep_torque_rate(t.last, t.dynamics, t.tick, torque));
   BOOST_TEST((torque == Eigen::Vector2d(6.0, 4.5)));
   const Eigen::VectorXd change = t.dynamics.mass().inverse() * Eigen::Vector2d(-2.0, 0.0);
   const Eigen::VectorXd expected = Eigen::Vector2d(1.0, 2.0) + change;
   BOOST_TEST((t.tracker.solution().acceleration - expected).norm() <
              1e-9 * change.norm());  // of a mass matrix of condition 100
-  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, torque));
+  BOOST_TEST(!t.tracker.keep_torque_rate(t.last, t.dynamics, t.tick, torque));
+}
+
+BOOST_AUTO_TEST_CASE(a_torque_changes_by_the_rate_of_a_period_however_late_the_step_is) {
+  Tracking t(Output::torque, 1000.0);
+  t.last.torque = Eigen::Vector2d(5.0, 5.0);
+  t.last.has_torque = true;
+  Tick tick = t.tick;
+  for (const double elapsed : {0.004, 0.001, 0.0005}) {
+    tick.elapsed = tick.period = elapsed;
+    Eigen::VectorXd torque = Eigen::Vector2d(80.0, 5.0);
+    BOOST_TEST(t.tracker.keep_torque_rate(t.last, t.dynamics, tick, torque));
+    BOOST_TEST(std::abs(torque[0] - 5.0 - 1000.0 * std::min(elapsed, 0.001)) < 1e-12);
+  }
 }
 
 BOOST_AUTO_TEST_CASE(a_velocity_leads_a_drifting_arm_back_no_faster_than_its_limits_allow) {
   Tracking t(Output::velocity);
   Reference reference = test::reference_at(Eigen::Vector2d(0.1, 0.1), Eigen::Vector2d(0.5, 0.0));
   Eigen::VectorXd velocity(2);
-  t.tracker.write_velocity(reference, Eigen::Vector2d(0.099, 0.1), true, velocity);
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.099, 0.1), true, t.tick, velocity);
   BOOST_TEST((velocity - Eigen::Vector2d(0.502, 0.0)).norm() < 1e-15);  // gain 2/s times 1 mrad; rounding
-  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, velocity);
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, t.tick, velocity);
   BOOST_TEST((velocity - Eigen::Vector2d(0.512, 0.0)).norm() < 1e-15);  // 10 rad/s² for 1 ms more than the last
-  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), false, velocity);
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), false, t.tick, velocity);
   BOOST_TEST((velocity - Eigen::Vector2d(0.502, 0.0)).norm() < 1e-15);  // where the arm is, nobody knows: back
   t.tracker.begin_anew();
   reference = test::reference_at(Eigen::Vector2d(0.1, 0.1), Eigen::Vector2d(2.5, 0.0));
-  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, velocity);
+  t.tracker.write_velocity(reference, Eigen::Vector2d(0.0, 0.1), true, t.tick, velocity);
   BOOST_TEST(velocity[0] == 2.5);  // the limit
 }
 
@@ -116,7 +132,8 @@ BOOST_AUTO_TEST_CASE(an_impedance_is_a_spring_of_torque_for_arms_that_are_moved_
   const Reference reference = test::reference_at(q + error, rest);
   const Clearances seen(2, model.system->num_embedding_coordinates());
   const LastOutput last(2);
-  static_cast<void>(tracker.track(reference, {q, rest, seen, dynamics, last, any_speed}, 0.002, TorqueStatus::ok));
+  static_cast<void>(
+      tracker.track(reference, {q, rest, seen, dynamics, last, any_speed}, 0.002, TorqueStatus::ok, Tick::regular(0.001)));
   // At rest K e + h is sent, K half of the effort limits per rad. The price of torque takes 1e-8 rad/s² of tracking at 1 kg m².
   const Eigen::VectorXd sent = 0.5 * model.arm.robot().limits().effort.cwiseProduct(error) + dynamics.bias();
   BOOST_TEST((tracker.solution().torque - sent).norm() < 1e-6);

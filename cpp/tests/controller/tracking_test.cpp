@@ -127,7 +127,7 @@ BOOST_AUTO_TEST_CASE(an_arm_with_a_payload_arrives_and_the_payload_is_found) {
   BOOST_TEST(worst < 0.05);  // [rad] on the way, of the first moment without its weight
   real.bias(q, v, of_real, bias);
   model.bias(q, v, of_model, held);
-  BOOST_TEST((command.disturbance - (held - bias)).cwiseAbs().maxCoeff() < 0.02);  // [Nm] of some 5
+  BOOST_TEST((command.observed.disturbance - (held - bias)).cwiseAbs().maxCoeff() < 0.02);  // [Nm] of some 5
   KinematicState state(arm.robot());
   state.update(arm.robot(), q, v);
   Eigen::VectorXd gravity(nv);

@@ -26,7 +26,7 @@ struct Tracing {
   }
   /// A period, in which the reference does what is asked.
   bool step(const Obstacles& obstacles = Obstacles::none(), double pace = 1.0) {
-    const bool goes_on = follower.follow(request, age, pace, reference, obstacles, target);
+    const bool goes_on = follower.follow(request, age, pace, reference, obstacles, Tick::regular(settings.period), target);
     reference.advance(target.desired_acceleration(), false, Eigen::Vector2d::Ones(), settings.period);
     reference.go_on();
     age += settings.period;
@@ -74,7 +74,7 @@ BOOST_AUTO_TEST_CASE(a_reference_beside_its_path_is_led_back_critically) {
   Tracing t(slow_path);
   t.go_on_until(1.0);
   t.reference.q += Eigen::Vector2d(0.01, -0.05);
-  t.follower.follow(t.request, t.age, 1.0, t.reference, Obstacles::none(), t.target);
+  t.follower.follow(t.request, t.age, 1.0, t.reference, Obstacles::none(), Tick::regular(t.settings.period), t.target);
   const JointGoal& motion = t.target.joint_motion();
   const double w = t.settings.inputs.frequency;
   for (Eigen::Index j = 0; j < 2; ++j) {

@@ -17,7 +17,8 @@ struct Following {
 
   /// Follows a velocity, and gives the acceleration that the target asks for.
   Eigen::VectorXd follow(const Eigen::Vector2d& velocity, const Reference& reference, bool fresh = true, double pace = 1.0) {
-    follower.follow(VelocityRequest{velocity}, fresh, pace, reference, {seen, rest, closing}, target);
+    follower.follow(VelocityRequest{velocity}, fresh, pace, reference, {seen, rest, closing},
+                    Tick::regular(model.settings.period), target);
     const JointGoal& goal = std::get<JointGoal>(target.attraction());
     return model.settings.barriers.damping * (goal.velocity - reference.v);
   }
@@ -62,7 +63,7 @@ BOOST_AUTO_TEST_CASE(a_reference_that_stays_behind_its_response_is_missed_after_
   int steps = 0;
   while (steps < 1000 && !f.follower.misses_for_long()) {
     f.follow(velocity, f.at_rest);
-    static_cast<void>(f.follower.judge(request, f.at_rest, f.rest));
+    static_cast<void>(f.follower.judge(request, f.at_rest, f.rest, Tick::regular(f.model.settings.period)));
     ++steps;
   }
   // After 3 periods the response alone would be off by the tolerance of 3.5 mrad/s; then 4 / (20 /s) are 200 periods.
@@ -81,7 +82,7 @@ BOOST_AUTO_TEST_CASE(a_reference_that_responds_misses_nothing_on_its_way) {
   for (int k = 0; k < 600; ++k) {
     const Eigen::VectorXd wanted = f.follow(velocity, reference);
     reference.advance(wanted, false, jerk, f.model.settings.period);
-    BOOST_TEST(!f.follower.judge(request, reference, wanted));
+    BOOST_TEST(!f.follower.judge(request, reference, wanted, Tick::regular(f.model.settings.period)));
     reference.go_on();
   }
   // 600 periods: (1 − 0.02)^600 of the difference is left.

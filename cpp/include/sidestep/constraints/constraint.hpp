@@ -60,7 +60,9 @@ struct Survey {
 
 /// All that a constraint may read of one solve.
 struct Moment {
-  double period;  ///< Time for which the acceleration is held [s].
+  double period;         ///< Time for which the acceleration is held [s].
+  double speed_share;    ///< Share of the velocity limits that torques leave which change rarely, in (0, 1].
+  double torque_period;  ///< Time whose change of torque may be made at once, at most as long [s].
   const Eigen::VectorXd& position;
   const Eigen::VectorXd& velocity;
   const Eigen::VectorXd* wanted;  ///< Wanted acceleration [/s²]; null: unusable.

@@ -11,7 +11,7 @@ struct DampedStop {
   double damping = 0.25;  ///< Joint damping without a mass matrix, in units of effort limit / velocity limit [-].
 
   struct State {
-    double period;
+    double torque_period;  ///< see Moment
     const JointLimits& limits;
     const Eigen::VectorXd& velocity;
     const Eigen::VectorXd* last_torque;

@@ -11,7 +11,7 @@ namespace sidestep {
 ///
 /// The arm moves by (M + J) v̇ + h = τ + d, with M and h of the model. The observer estimates
 ///   - the disturbance d: friction, payload, wrong gravity. With the acceleration a predicted with the present d, d changes by
-///     (M + J) (v̇ − a) T/T_o in every period T: it follows with the time constant T_o;
+///     (M + J) (v̇ − a) T/T_o in every step, T after the last: it follows with the time constant T_o;
 ///   - the inertias J of rotors (diagonal), which gears make larger than those of light links. For each joint j it fits
 ///         τ − h − z = J v̇ + p z + f sign(v) + b v + c,     z = (M v̇)_j,
 ///     by least squares over the last seconds of motion, with all terms filtered. p stands for a payload, which scales the
@@ -22,14 +22,20 @@ namespace sidestep {
 /// constructor allocates.
 class DisturbanceObserver {
  public:
-  /// period, time: T, T_o [s], positive; share: bound of |d| over the effort limits [-].
-  DisturbanceObserver(const JointLimits& limits, double period, double time, double share);
+  /// time: T_o [s], positive; share: bound of |d| over the effort limits [-].
+  DisturbanceObserver(const JointLimits& limits, double time, double share);
 
-  /// Takes one period: velocity (nv) [/s] at its begin and end, the torque sent (nv) [Nm | N], the predicted acceleration (nv), the
-  /// model's mass matrix (nv × nv) and bias (nv) there. Values that are not finite change nothing. Nor does a single jump of the
-  /// velocity, as by an impact, by more than a tenth of its limit beyond the prediction.
-  void update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
-              const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
+  /// The motion from one step to the next.
+  struct Motion {
+    const Eigen::VectorXd& before;     ///< velocity (nv) [/s] at its begin
+    const Eigen::VectorXd& after;      ///< and at its end
+    const Eigen::VectorXd& torque;     ///< sent (nv) [Nm | N]
+    const Eigen::VectorXd& predicted;  ///< acceleration (nv)
+    double duration;                   ///< T [s], positive
+  };
+  /// Takes a motion, with the model's mass matrix (nv × nv) and bias (nv) there. Values that are not finite change nothing. Nor does a
+  /// single jump of the velocity, as by an impact, by more than a tenth of its limit beyond the prediction.
+  void update(const Motion& motion, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
 
   /// Removes `change` (nv) of the model's bias from d, for example when the model is told of a payload. Data about rotors came from
   /// the previous model and are forgotten; estimates stay.
@@ -51,11 +57,11 @@ class DisturbanceObserver {
     Eigen::Matrix<double, num_terms, num_terms + 1> instrumented = Eigen::Matrix<double, num_terms, num_terms + 1>::Zero();
     Eigen::Matrix<double, num_terms + 1, num_terms + 1> products = Eigen::Matrix<double, num_terms + 1, num_terms + 1>::Zero();
   };
-  void identify(Eigen::Index joint, const Seen& seen, const Terms& told) noexcept;
-  void find_rotor(Eigen::Index joint, double mass) noexcept;
+  void identify(Eigen::Index joint, const Seen& seen, const Terms& told, double duration) noexcept;
+  void find_rotor(Eigen::Index joint, double mass, double duration) noexcept;
 
-  double period_, share_of_period_;
-  Eigen::VectorXd most_disturbance_, most_unexpected_, most_rotor_;
+  double time_;
+  Eigen::VectorXd most_disturbance_, most_leap_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
   std::vector<Joint> joints_;
   bool leaps_ = false;    // Whether the velocity jumped in the last period.

@@ -52,6 +52,13 @@ struct MotionProgramSettings {
   void validate(const Robot& robot) const;
 };
 
+/// Periods of a loop that is not called as often as it was told.
+struct MotionPeriods {
+  double coming = 0.0;  ///< Until the next solve [s]; 0: the period of the settings.
+  double torque = 0.0;  ///< Time whose change of torque may be made at once [s]; 0: the coming period.
+  double speed = 1.0;   ///< Share of the velocity limits for joints where some torque has a rate, in (0, 1].
+};
+
 /// Input of one solve.
 struct MotionRequest {
   Eigen::Ref<const Eigen::VectorXd> q;             ///< Position (nv) [rad | m].
@@ -65,6 +72,7 @@ struct MotionRequest {
   SecondState second = {};
   LastCommand last = {};
   SpeedLimitNow speed = {};
+  MotionPeriods periods = {};
 };
 
 /// Acceleration, and the torque for it, nearest to a wanted one within a list of constraints (thesis T6.3, corrected):
@@ -105,7 +113,7 @@ class MotionProgram {
   /// they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_.data(); }
   /// The share of the jerk limits by which the torque keeps its rate with the last mass matrix, see torque_rate_constraint.hpp.
-  double jerk_share() const noexcept;
+  double jerk_share(const MotionPeriods& periods = {}) const noexcept;
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 

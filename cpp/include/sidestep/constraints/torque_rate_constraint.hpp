@@ -5,7 +5,7 @@
 namespace sidestep {
 
 /// Share of the jerk limits with which no torque exceeds its rate, for any motion of the joints; M (nv, nv). 1 without a rate.
-double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits) noexcept;
+double jerk_share(const Eigen::MatrixXd& mass, const JointLimits& limits, double rate_share = 1.0) noexcept;
 
 /// Rate of torque: |torque − last torque| <= effort rate · T, as far as effort allows.
 class TorqueRateConstraint : public Constraint {

@@ -50,12 +50,15 @@ struct Command {
   Eigen::VectorXd acceleration;            ///< (nv) of the arm: that of the reference plus feedback [rad/s² | m/s²]
   Eigen::VectorXd velocity;                ///< (nv) of the reference after this period [rad/s | m/s]
   Eigen::VectorXd position;                ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
-  Eigen::VectorXd disturbance;             ///< (nv) force that the observer compensates, for torque output [Nm | N]
-  Eigen::VectorXd rotors;                  ///< (nv) estimated inertia that the model lacks [kg m² | kg]
-  double tracking_error = 0.0;             ///< largest |q_r − q| [rad | m]
-  double deviation = 0.0;                  ///< of the reference from the straight lines between a trajectory's samples, in the
-                                           ///< farthest joint [rad | m], see JointTrajectory::deviation
-  double delay = 0.0;                      ///< time by which the trajectory's clock is late [s]
+  /// What torque output finds beside its model (nv).
+  struct Observed {
+    Eigen::VectorXd disturbance;  ///< force that is compensated [Nm | N]
+    Eigen::VectorXd rotors;       ///< estimated inertia that the model lacks [kg m² | kg]
+  } observed;
+  double tracking_error = 0.0;  ///< largest |q_r − q| [rad | m]
+  double deviation = 0.0;       ///< of the reference from the straight lines between a trajectory's samples, in the
+                                ///< farthest joint [rad | m], see JointTrajectory::deviation
+  double delay = 0.0;           ///< time by which the trajectory's clock is late [s]
   /// (nv) Difference between the velocity of the reference after this period and the requested one [rad/s | m/s]. For a twist V:
   /// J⁺ (J v − V), damped near singularities; motion in the null space of J does not count. For a trajectory the requested
   /// velocity is that at its clock, at full speed. Zero without one of these.
@@ -83,15 +86,24 @@ struct Command {
     double look_ahead_age = 0.0, planner_age = 0.0;
     double pace = 1.0;  ///< share of its speed that the arm may use near moving obstacles, see LookAheadSettings::pace
   } background;
+  /// How often `step` is called, against the period of the settings.
+  struct Timing {
+    /// Measured period for which the step commands [s]: that of the settings, unless the last steps came otherwise.
+    double measured_period = 0.0;
+    int late_steps = 0;      ///< steps so far that came more than 1.5 periods after the one before
+    int missed_periods = 0;  ///< periods so far in which a step was missing
+  } timing;
 };
 
 /// Calls visit(name, field) for every field. A new field does not compile until it is named here.
 template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
-  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
-         tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit,
-         limits, avoiding, on_path, background] = command;
+  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, observed, tracking_error,
+         deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, avoiding,
+         on_path, background, timing] = command;
+  auto& [disturbance, rotors] = observed;
   auto& [look_ahead_age, planner_age, pace] = background;
+  auto& [measured_period, late_steps, missed_periods] = timing;
   visit("status", status);
   visit("activity", activity);
   visit("torque", torque);
@@ -119,6 +131,9 @@ void each_field(C& command, Visit&& visit) {
   visit("planner_age", planner_age);
   visit("pace", pace);
   visit("on_path", on_path);
+  visit("measured_period", measured_period);
+  visit("late_steps", late_steps);
+  visit("missed_periods", missed_periods);
 }
 
 }  // namespace sidestep

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <atomic>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -101,7 +102,7 @@ class Controller {
   /// after a touch, see ContactSettings. The goal stays, and a trajectory continues from where its clock is. From any thread; no allocation.
   ///
   /// Without this call the reference restarts once five measured positions in a row agree with each other but not with the
-  /// reference, or at the first one that disagrees after more than 0.1 s without a step, by the machine's clock. Until then the reference comes to rest,
+  /// reference, or at the first one that disagrees after more than 0.1 s without a step, by the time that is told or the machine's clock. Until then the reference comes to rest,
   /// and the status is `tracking_lost`.
   void restart() noexcept { restarts_.store(true, std::memory_order_release); }
 
@@ -146,10 +147,14 @@ class Controller {
   /// Computes the command of one period at q [rad | m] and v [rad/s | m/s] (nv). A wrong size or a value that is not finite
   /// gives a damped stop with the status `stopping`. So does a call while another thread is inside `step`: that call gets a
   /// command of its own, at rest and without a position, and changes nothing.
-  const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
+  ///
+  /// `time`: when q and v were measured, on a monotonic clock of the caller [s]; NaN: not told. Then the machine's clock counts, where
+  /// steps that come sooner than a period count as a period: a loop faster than real time is a simulation. A `synchronous` controller
+  /// then counts exactly a period. A time that goes back or stands still gives a damped stop, and the next step goes on from it.
+  const Command& step(ConstVectorRef q, ConstVectorRef v, double time = std::numeric_limits<double>::quiet_NaN()) noexcept;
   /// The same with the arm's own mass matrix (nv × nv) and bias (nv) [Nm | N] there; for torque output.
-  const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
-                      ConstVectorRef bias) noexcept;
+  const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix, ConstVectorRef bias,
+                      double time = std::numeric_limits<double>::quiet_NaN()) noexcept;
 
   /// Whether the last steps came from several threads in turn, as from two loops that share a controller. Only for the thread
   /// of `step`.
@@ -228,7 +233,7 @@ class Controller {
   void install(std::unique_ptr<Impl> fresh, const Arm& whole, std::vector<Held> held);
   void note_requests();
   const Command& step_with(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
-                           const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
+                           const Eigen::Ref<const Eigen::VectorXd>* bias, double time) noexcept;
 
   static void destroy(Impl* newest) noexcept;
 

@@ -27,6 +27,7 @@ class StopTrajectory {
   [[nodiscard]] bool plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const JointLimits& limits, double period,
                           double jerk_share = 1.0) noexcept;
 
+  double period() const noexcept { return period_; }  ///< T [s] of the last plan
   /// Number of periods left until rest.
   int num_periods() const noexcept { return num_periods_ - passed_; }
   /// Largest distance of each joint from where the stop was planned (nv) [rad | m].

@@ -76,8 +76,10 @@ class OnlinePlanner {
   [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
   /// One step of the loop, at a time [s] that never decreases; if it is not finite, nothing changes and the status is
-  /// `invalid`. Never blocks; allocates nothing unless synchronous.
-  [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Reference& reference) noexcept;
+  /// `invalid`. Never blocks; allocates nothing unless synchronous. The path leads on by the time since the last step, by `most` [s] at
+  /// most: an arm that was not commanded for longer has stood.
+  [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Reference& reference,
+                                         double most = std::numeric_limits<double>::infinity()) noexcept;
 
   /// Age [s] of the state that the planner has checked last, or of the goal, at the time [s] of the last `step`; during a check
   /// by the machine's clock if that is longer. 0: synchronous, or no goal. For the loop.
@@ -129,7 +131,7 @@ class OnlinePlanner {
   bool leads(const Answer& answer) const noexcept {
     return answer.goal_number == goal_number_ && answer.status == PlanStatus::found;
   }
-  void lead(const Answer& answer, ConstVectorRef q, double time, Reference& reference) noexcept;
+  void lead(const Answer& answer, ConstVectorRef q, double duration, Reference& reference) noexcept;
   /// Counts a stop where the arm makes no progress towards the goal.
   void watch_progress(const Answer& answer, ConstVectorRef q, double time, const Reference& reference) noexcept;
   OnlinePlannerStatus status(const Answer& answer, double time) const noexcept;

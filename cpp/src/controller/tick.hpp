@@ -1,0 +1,51 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sidestep {
+
+/// The moment of a step: all that a stage knows of time. Times in seconds, on the controller's own clock, which never goes back.
+struct Tick {
+  double time = 0.0;      ///< now
+  double elapsed = 0.0;   ///< since the last step
+  double moved = 0.0;     ///< the same, for what the last command moved: a gap counts as the period that was expected
+  double held = 0.0;      ///< the same, as the reference counts it: jitter below half a period counts as none
+  double expected = 0.0;  ///< period for which the last step commanded
+  double period = 0.0;    ///< Period for which this step commands: how soon the next step is expected.
+  double told = 0.0;      ///< period of the settings
+  bool gap = false;       ///< no loop is as late as this step
+  bool pauses = false;    ///< the same, or by the machine's clock where the time was not told
+  /// By how much the time that was told went back; 0: it stands still; NaN: it goes on.
+  double back = std::numeric_limits<double>::quiet_NaN();
+  double offset = 0.0;  ///< own time less the caller's
+  int late = 0;         ///< steps so far that came later than one and a half periods of the settings after the one before
+  int missed = 0;       ///< periods of the settings so far in which a step was missing
+
+  /// A stamp of the caller's clock on the controller's own: of the clock that steps are told; before any was, of the machine's
+  /// (std::chrono::steady_clock, in Python time.monotonic), in a synchronous run of the controller's own.
+  double own_time(double stamp) const noexcept { return stamp + offset; }
+  bool goes_on() const noexcept { return std::isnan(back); }
+  /// The last command was held as long as the last step expected.
+  bool is_as_expected() const noexcept { return held == expected; }
+  /// Time for whose change of torque a step may make up: a drive judges each of its own periods, however rarely it is told.
+  double torque_period() const noexcept { return std::min(elapsed, told); }
+
+  /// Share of its speed for an arm whose torques change at a limited rate: gravity and inertia ask for less of it in slower motions, and
+  /// a loop below a quarter of the told rate leaves them too little.
+  double speed_share() const noexcept {
+    constexpr double usual_share = 0.25;
+    const double share = told / (period * usual_share);
+    return share < 1.0 ? share * std::sqrt(share) : 1.0;
+  }
+  /// Time by which a reference whose velocities are held for the period leads an arm that moves on in periods of the settings.
+  double lead() const noexcept { return 0.5 * (period - told); }
+
+  /// The moment of a loop that is never late.
+  static Tick regular(double period, double time = 0.0) noexcept {
+    return {time, period, period, period, period, period, period};
+  }
+};
+
+}  // namespace sidestep
