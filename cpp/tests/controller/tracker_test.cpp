@@ -149,12 +149,12 @@ BOOST_AUTO_TEST_CASE(a_reference_yields_to_where_feedback_pushes_by_a_torque_at_
   const auto pushes = [&](const Reference& r) { return Eigen::VectorXd(w * w * t.dynamics.mass() * (r.q - t.q)); };
   Reference near = test::reference_at(t.q + Eigen::Vector2d(1e-4, -1e-4), t.v), before = near;
   BOOST_TEST((pushes(near).cwiseAbs().array() < most.array()).all());
-  BOOST_TEST(!t.tracker.yield(t.q, t.dynamics.mass(), most, near));
+  BOOST_TEST(!t.tracker.yield(t.q, t.dynamics.mass(), most, t.tick, near));
   BOOST_TEST((near.q == before.q));
   Reference far = test::reference_at(t.q + Eigen::Vector2d(0.3, -0.1), t.v);
   BOOST_TEST(pushes(far)[0] > 10.0 * most[0]);
   for (int k = 0; k < 100; ++k) {  // joints have inertia in common: one after the other, again in every step
-    static_cast<void>(t.tracker.yield(t.q, t.dynamics.mass(), most, far));
+    static_cast<void>(t.tracker.yield(t.q, t.dynamics.mass(), most, t.tick, far));
   }
   BOOST_TEST((pushes(far).cwiseAbs().array() < 1.01 * most.array()).all());
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time as clock
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
@@ -67,6 +68,9 @@ class ControllerAdapter:
 
     def __init__(self, controller: Controller, obstacles: Seen | Callable[[float], Seen | None]) -> None:
         self.controller = controller
+        self._period = controller.settings.period
+        # A simulation may take longer than real time: it tells its own, which goes on from that of one before.
+        self._time = None if controller.settings.synchronous else clock.monotonic()
         self._see = obstacles if callable(obstacles) else None
         if not callable(obstacles):
             controller.set_obstacles(obstacles, valid_for=math.inf)  # the world is what it is said to be
@@ -83,10 +87,12 @@ class ControllerAdapter:
         seen = None if self._see is None else self._see(time)
         if seen is not None:
             self.controller.set_obstacles(seen, valid_for=math.inf)
+        if self._time is not None:
+            self._time += self._period
         if self.controller.has_torque and mass_matrix is not None:
-            command = self.controller.step(q, v, mass_matrix, bias)
+            command = self.controller.step(q, v, mass_matrix, bias, time=self._time)
         else:
-            command = self.controller.step(q, v)
+            command = self.controller.step(q, v, time=self._time)
         return StepRecord(
             torque=command.torque,
             acceleration=command.acceleration,

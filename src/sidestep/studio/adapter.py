@@ -89,6 +89,7 @@ class ControllerAdapter:
     def __init__(self, robot: Robot, arm: Arm, settings: ControllerSettings, tip: str) -> None:
         self._robot, self._arm, self._settings, self._tip = robot, arm, settings, tip
         self._controller = Controller(arm, settings)
+        self._time = 0.0  # [s] that the simulation has run
         self._told: Obstacles | None = None
         self._said: Controller | None = None  # took the last step
         self._seen, self._q = Obstacles.none(), np.array(robot.neutral)  # of that step
@@ -117,7 +118,8 @@ class ControllerAdapter:
             self._controller.set_obstacles(obstacles, valid_for=math.inf)  # they are where the page has them
             self._told = obstacles
         self._said, self._seen, self._q = self._controller, obstacles, q
-        return self._controller.step(q, v, mass_matrix, bias).torque
+        self._time += self._settings.period  # that of the simulation, which may be slower than real time
+        return self._controller.step(q, v, mass_matrix, bias, time=self._time).torque
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
         """Takes a step without time passing: of another controller, that does not plan ahead."""
