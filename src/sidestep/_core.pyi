@@ -257,10 +257,10 @@ class Obstacles:
         Of what belongs together, in the order of the points: its name, None where it has none, and how many.
         """
 
-    def named(self, names: Sequence[str], counts: Sequence[int]) -> Obstacles:
+    def named(self, names: Sequence[str], counts: Sequence[int], poses: list[numpy.typing.NDArray[numpy.float64]] | None = None) -> Obstacles:
         """
         The same points with the names of what they belong to: the first counts[0] points to names[0], and so on;
-        an empty name is none. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.
+        an empty name is none. poses: (4, 4) of each in the world, by which Controller.move_obstacle moves it. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.
         """
 
     def name_of(self, point: int) -> str | None:
@@ -2547,6 +2547,49 @@ class SpeedLimitSettings:
     @far_distance.setter
     def far_distance(self, value: float, /) -> None: ...
 
+class ContactSettings:
+    """
+    When a torque that neither model, load nor friction explains stops the arm: it waits for `Controller.restart`. With torque
+    output; not with `tracking.stiffness`: such an arm is made to be pushed.
+
+        share, default 0.3, allowed 0.02 to inf: largest torque that neither model, load nor friction explains, as a share of the effort limits: from there on the arm stops and waits for restart(); smaller feels gentler touches, but untold loads and friction stop the arm too; inf: no stop
+        time [s], default 0.01, allowed 0 to 1: time for which that torque has to last: longer ignores short knocks
+
+    A Controller refuses what is not allowed.
+    """
+
+    def __init__(self, *, share: float = 0.3, time: float = 0.01) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: ContactSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> ContactSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def share(self) -> float: ...
+
+    @share.setter
+    def share(self, value: float, /) -> None: ...
+
+    @property
+    def time(self) -> float: ...
+
+    @time.setter
+    def time(self, value: float, /) -> None: ...
+
 class InputSettings:
     """
     How velocities, twists and trajectories are followed, see Controller.
@@ -2609,6 +2652,55 @@ class InputSettings:
 
     @lead.setter
     def lead(self, value: float, /) -> None: ...
+
+class SourceSettings:
+    """
+    How long obstacles are believed, see Controller.set_obstacles.
+
+        valid_for [s], default 0.25, allowed 0.01 to inf: age up to which a source of obstacles is believed that was given a time, has velocities or comes again and again: beyond it the arm stops until the source comes again; shorter is safer, longer tolerates more lost sets
+        largest_speed [m/s], default 2.0, allowed 0 to 100: largest speed of obstacles that nobody has told of: larger keeps the arm farther from what is overdue or uncertain
+        empty_after [s], default 2.0, allowed 0 to inf: time for which a source that had obstacles must stay empty before that is believed: longer survives a camera that sees nothing for longer; remove_obstacles is believed at once
+
+    A Controller refuses what is not allowed.
+    """
+
+    def __init__(self, *, valid_for: float = 0.25, largest_speed: float = 2.0, empty_after: float = 2.0) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: SourceSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> SourceSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def valid_for(self) -> float: ...
+
+    @valid_for.setter
+    def valid_for(self, value: float, /) -> None: ...
+
+    @property
+    def largest_speed(self) -> float: ...
+
+    @largest_speed.setter
+    def largest_speed(self, value: float, /) -> None: ...
+
+    @property
+    def empty_after(self) -> float: ...
+
+    @empty_after.setter
+    def empty_after(self, value: float, /) -> None: ...
 
 class OnlinePlannerSettings:
     """
@@ -2837,7 +2929,7 @@ class ControllerSettings:
         slack_weight, default 1000.0, allowed 1 to 1e+06: weight of exceeding velocity and acceleration limits, relative to acceleration error: larger exceeds them less
         velocity_overrun, default 1.2, allowed 1 to 10: largest velocity that a clearance may demand, as a multiple of the velocity limit
         acceleration_overrun, default 10.0, allowed 1 to 100: largest acceleration that a clearance may demand, as a multiple of the acceleration limit
-        obstacle_timeout [s], default inf, allowed 0.001 to inf: age above which obstacles are stale and the arm stops
+        obstacle_timeout [s], default inf, allowed 0.001 to inf: age above which every source of obstacles without a valid_for of its own is stale and the arm stops
         local_activation, default True, allowed 0 to 1: shorter activation distances near the goal and in narrow places, among static obstacles; without it the arm creeps there
         synchronous, default False, allowed 0 to 1: run planner, look-ahead and posture search inside step: motions repeat bit for bit, steps take longer
         seed, default 0, allowed 0 to 1.84467e+19: seed of all random numbers
@@ -2845,7 +2937,7 @@ class ControllerSettings:
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, period: float = 0.001, speed: float = 1.0, limit_margin: float = 0.02, effort_margin: float = 0.05, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., inputs: InputSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+    def __init__(self, *, period: float = 0.001, speed: float = 1.0, limit_margin: float = 0.02, effort_margin: float = 0.05, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., inputs: InputSettings = ..., sources: SourceSettings = ..., contact: ContactSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
@@ -2980,10 +3072,22 @@ class ControllerSettings:
     def tracking(self, arg: TrackingSettings, /) -> None: ...
 
     @property
+    def contact(self) -> ContactSettings: ...
+
+    @contact.setter
+    def contact(self, arg: ContactSettings, /) -> None: ...
+
+    @property
     def inputs(self) -> InputSettings: ...
 
     @inputs.setter
     def inputs(self, arg: InputSettings, /) -> None: ...
+
+    @property
+    def sources(self) -> SourceSettings: ...
+
+    @sources.setter
+    def sources(self, arg: SourceSettings, /) -> None: ...
 
     @property
     def output(self) -> Output: ...
@@ -3073,13 +3177,11 @@ class SafetyStatus(enum.IntEnum):
     """
 
     stale = 5
-    """
-    The obstacles are older than obstacle_timeout, or it is set and obstacles never were: the arm stops.
-    """
+    """A source of obstacles is overdue, or none was ever set: the arm stops."""
 
     stopping = 6
     """
-    The input is unusable or the quadratic program was not solved: a damped stop.
+    The input is unusable, the quadratic program was not solved, or the arm feels a torque that nothing explains: a damped stop.
     """
 
     clearance_lost = 7
@@ -3099,7 +3201,9 @@ class Activity(enum.Enum):
     """On the way to its goal, or following a velocity, twist or trajectory."""
 
     waiting = 2
-    """Waiting until a posture is found, or until its trajectory is free."""
+    """
+    Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`.
+    """
 
     arrived = 3
     """The goal is reached."""
@@ -3259,6 +3363,22 @@ class Command:
         `look_ahead.slow_after` delays, then linear, 0 from `look_ahead.rest_after` delays on.
         """
 
+    @property
+    def measured_period(self) -> float:
+        """
+        Period for which the step commands [s]: that of the settings, unless the last steps came more or less often.
+        """
+
+    @property
+    def late_steps(self) -> int:
+        """
+        Steps so far that came more than 1.5 periods of the settings after the one before.
+        """
+
+    @property
+    def missed_periods(self) -> int:
+        """Periods of the settings so far in which a step was missing."""
+
     def __getstate__(self) -> dict[str, Any]: ...
 
     def __setstate__(self, state: dict[str, Any], /) -> None: ...
@@ -3316,15 +3436,9 @@ class Controller:
 
     def restart(self) -> None:
         """
-        Restarts the reference at the measured state of the next step: call it after something else has moved the arm. The goal
-        stays. Without this call the reference restarts once five measured positions in a row agree with each other but not
+        Restarts the reference at the measured state of the next step: call it after something else has moved the arm, or to go on
+        after the arm touched something. The goal stays. Without this call the reference restarts once five measured positions in a row agree with each other but not
         with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.
-        """
-
-    def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape]) -> None:
-        """
-        Replaces all obstacles, from the next step on: points, a shape, or a list of both. Balls cover each shape without gaps,
-        see `sidestep.obstacles.obstacles_from_shapes`. Obstacles move on by their velocities until the next call.
         """
 
     def set_arm(self, arm: Arm) -> None:
@@ -3363,10 +3477,11 @@ class Controller:
         A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.
         """
 
-    def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command:
+    def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, time: float | None = None) -> Command:
         """
         One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
-        [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
+        [Nm | N] there. `time`: when q and v were measured, on a monotonic clock of yours [s]; without it (None or nan) the machine's
+        clock counts, and in synchronous runs exactly a period. A time that goes back gives a damped stop. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
         while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads
         step it in turn.
         """
@@ -3458,6 +3573,50 @@ class Controller:
 
     def __repr__(self) -> str: ...
 
+    def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape], source: str = 'scene', *, time: float | None = None, valid_for: float | None = None) -> None:
+        """
+        Replaces what a source said before, and nothing of the others, from the next step on: points, a shape, or a list of both. Balls
+        cover each shape without gaps, see `sidestep.obstacles.obstacles_from_shapes`. Points move on by their velocities, from `time`
+        on: when they were captured [s], on the clock of `step`; None: when the next step takes them.
+
+        valid_for [s]: age up to which they are believed; inf: for ever. None: `sources.valid_for` where they have a time or velocities, or
+        where the source came three times within that; else for ever (`obstacle_timeout`). A source that is older is overdue: its points
+        stand still, the arm stops, and goes on when it comes again. An empty set after one with points is believed once the source
+        has stayed empty for `sources.empty_after`; `remove_obstacles` at once. Until anything was set the arm stays where it is:
+        `Obstacles.none()` says that the space is free. Raises ValueError that names the value and what is allowed.
+        """
+
+    def remove_obstacles(self, source: str = 'scene') -> None:
+        """Forgets a source, at once. Raises ValueError that lists the sources."""
+
+    def add_obstacle(self, obstacle: Obstacles | sidestep.obstacles.Shape, source: str = 'scene') -> None:
+        """
+        Adds a shape with a name to what a source says. Raises ValueError where it has no name, or the source has that name already.
+        """
+
+    def move_obstacle(self, name: str, pose: numpy.typing.ArrayLike, source: str = 'scene', *, time: float | None = None, valid_for: float | None = None) -> None:
+        """
+        Moves a shape that has a name to another pose (4, 4) in the world. Like `set_obstacles` it says that the whole source is as
+        new as `time`: give each tracker a source of its own. Raises ValueError that lists the names.
+        """
+
+    def remove_obstacle(self, name: str, source: str = 'scene') -> None:
+        """
+        Removes a shape that has a name from what a source says, at once. Raises ValueError that lists the names.
+        """
+
+    @property
+    def time(self) -> float:
+        """
+        Time of the last step [s], on the clock on which obstacles are captured.
+        """
+
+    @property
+    def sources(self) -> list[SourceState]:
+        """
+        What is believed of each source, a SourceState each, as of the last step. For the thread of `step`.
+        """
+
 def looks_like_degrees(angle: float) -> bool:
     """
     Whether an angle [rad] is implausible in radians and plausible in degrees: more than one and a half turns, at most
@@ -3524,6 +3683,34 @@ def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing
     is within tolerance [rad], a prismatic one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
     ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
+
+class SourceState:
+    """What a controller believes of a source of obstacles."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+
+    @property
+    def age(self) -> float:
+        """Time since what is believed was captured [s]."""
+
+    @property
+    def valid_for(self) -> float:
+        """Age up to which it is believed [s]; inf: for ever."""
+
+    @property
+    def is_overdue(self) -> bool:
+        """It is older than that: the arm stops until it comes again."""
+
+    @property
+    def is_emptied(self) -> bool:
+        """Newer sets are empty, and not believed yet."""
+
+    def __repr__(self) -> str: ...
 
 class RealTimeRun:
     """

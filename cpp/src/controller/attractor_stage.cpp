@@ -1,8 +1,16 @@
 #include "attractor_stage.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace sidestep {
+namespace {
+
+constexpr double end_of_braking = 0.1;  // Time constant with which braking ends, as a share of the stop's [-].
+constexpr double least_periods = 5.0;   // The same at least [periods].
+
+}  // namespace
 
 AttractorStage::AttractorStage(std::shared_ptr<const GeometricSystem> system, const ControllerSettings& settings)
     : system_(std::move(system)),
@@ -33,11 +41,21 @@ StepStatus AttractorStage::attract(const Lead& lead, const Reference& reference,
     }
   }
   if (lead.rests) {
-    wanted = -reference.v / settings_.stop_time;
+    write_braking(reference.v, wanted);
   } else if (closing.changes() && lead.avoidance == nullptr && !is_fallback(status)) {
     wait_in_doubt(closing, wanted);
   }
   return status;
+}
+
+void AttractorStage::write_braking(const Eigen::VectorXd& v, Eigen::VectorXd& wanted) const noexcept {
+  const JointLimits& limits = system_->robot().limits();
+  const double last = std::max(end_of_braking * settings_.stop_time, least_periods * settings_.period);
+  for (Eigen::Index j = 0; j < v.size(); ++j) {
+    const double speed = std::abs(v[j]);
+    const double most = std::min(limits.acceleration[j], std::sqrt(limits.jerk[j] * speed));  // half the jerk: 2 (j / 2) |v|
+    wanted[j] = -std::copysign(std::min(most, speed / last), v[j]);
+  }
 }
 
 void AttractorStage::wait_in_doubt(const ClosingEstimate& closing, Eigen::VectorXd& wanted) const noexcept {

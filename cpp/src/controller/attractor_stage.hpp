@@ -49,6 +49,8 @@ class AttractorStage {
   Eigen::VectorXd& activations() noexcept { return reference_.activations; }
 
  private:
+  /// Writes the acceleration that stops a velocity as fast as the limits of acceleration and jerk allow.
+  void write_braking(const Eigen::VectorXd& v, Eigen::VectorXd& wanted) const noexcept;
   /// Removes the recovery from obstacles that are in doubt, if nothing else needs it.
   void wait_in_doubt(const ClosingEstimate& closing, Eigen::VectorXd& wanted) const noexcept;
 
