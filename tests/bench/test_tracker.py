@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sidestep.bench import Told, timed_calls, tracker
+from sidestep.bench import Told, tracker
 from sidestep.bench.tracker import GONE, SEEN_EVERY, VALID_FOR, Tracker
 from sidestep.distance import SceneObject
 
@@ -34,10 +34,7 @@ class Listener:
         self.told.append((self.step, x, vx, source, time))
 
 
-def listen(
-    monkeypatch: pytest.MonkeyPatch, told: Told, *, stands: bool = False, steps: int = 2000
-) -> Listener:
-    monkeypatch.setattr(timed_calls, "_SETS_HAVE_SOURCES", True)
+def listen(told: Told, *, stands: bool = False, steps: int = 2000) -> Listener:
     begins = FAILS * 1e-3
     solid = SceneObject.ball(
         "solid",
@@ -58,8 +55,8 @@ def listen(
 
 
 @pytest.mark.parametrize("told", [Told.exact, Told.untold, Told.late])
-def test_sets_without_stamps_are_of_the_scene(monkeypatch: pytest.MonkeyPatch, told: Told) -> None:
-    for step, x, vx, source, time in listen(monkeypatch, told).told:
+def test_sets_without_stamps_are_of_the_scene(told: Told) -> None:
+    for step, x, vx, source, time in listen(told).told:
         assert step % SEEN_EVERY == 0
         assert x == pytest.approx(0.5 * max(0.0, 1e-3 * step - (LAG if told is Told.late else 0.0)))
         assert vx == (0.0 if told is Told.untold else 0.5)
@@ -67,10 +64,8 @@ def test_sets_without_stamps_are_of_the_scene(monkeypatch: pytest.MonkeyPatch, t
 
 
 @pytest.mark.parametrize("told", [Told.late_stamped, Told.arrival])
-def test_late_sets_have_the_time_of_capture_or_of_arrival(
-    monkeypatch: pytest.MonkeyPatch, told: Told
-) -> None:
-    heard = listen(monkeypatch, told).told
+def test_late_sets_have_the_time_of_capture_or_of_arrival(told: Told) -> None:
+    heard = listen(told).told
     assert heard[0] == (0, 0.0, 0.5, "tracker", 0.0)
     assert heard[1][0] == 3 * SEEN_EVERY  # the first that was captured since the start: after 80 ms
     for step, x, _, source, time in heard[1:]:
@@ -79,16 +74,14 @@ def test_late_sets_have_the_time_of_capture_or_of_arrival(
         assert source == "tracker"
 
 
-def test_lost_sets_do_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
-    steps = [step for step, *_ in listen(monkeypatch, Told.lost30).told]
+def test_lost_sets_do_not_come() -> None:
+    steps = [step for step, *_ in listen(Told.lost30).told]
     assert steps == [k * SEEN_EVERY for k in range(2000 // SEEN_EVERY + 1) if k % 3 != 1]
 
 
 @pytest.mark.parametrize("stands", [False, True])
-def test_frozen_sets_are_the_last_true_one_with_new_stamps(
-    monkeypatch: pytest.MonkeyPatch, stands: bool
-) -> None:
-    heard = listen(monkeypatch, Told.frozen, stands=stands).told
+def test_frozen_sets_are_the_last_true_one_with_new_stamps(stands: bool) -> None:
+    heard = listen(Told.frozen, stands=stands).told
     assert [step for step, *_ in heard] == list(range(0, 2000, SEEN_EVERY))
     for step, x, vx, _, time in heard:
         assert x == pytest.approx(0.5e-3 * min(step, FAILS))
@@ -97,10 +90,8 @@ def test_frozen_sets_are_the_last_true_one_with_new_stamps(
 
 @pytest.mark.parametrize("told", [Told.vanished, Told.vanished_untold])
 @pytest.mark.parametrize("stands", [False, True])
-def test_vanished_sets_are_empty_for_a_second(
-    monkeypatch: pytest.MonkeyPatch, told: Told, stands: bool
-) -> None:
-    for step, x, vx, source, time in listen(monkeypatch, told, stands=stands).told:
+def test_vanished_sets_are_empty_for_a_second(told: Told, stands: bool) -> None:
+    for step, x, vx, source, time in listen(told, stands=stands).told:
         assert (source, time) == ("tracker", pytest.approx(1e-3 * step))
         if FAILS < step < FAILS + round(1e3 * GONE):
             assert x is None
@@ -111,8 +102,8 @@ def test_vanished_sets_are_empty_for_a_second(
 
 
 @pytest.mark.parametrize("told", [Told.dead, Told.dead_untold])
-def test_nothing_comes_from_a_dead_tracker(monkeypatch: pytest.MonkeyPatch, told: Told) -> None:
-    heard = listen(monkeypatch, told).told
+def test_nothing_comes_from_a_dead_tracker(told: Told) -> None:
+    heard = listen(told).told
     assert [step for step, *_ in heard] == list(range(0, FAILS + 1, SEEN_EVERY))
     assert heard[-1][1] == pytest.approx(0.5e-3 * FAILS)
     assert heard[-1][2] == (0.5 if told.has_velocity else 0.0)

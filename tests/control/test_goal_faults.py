@@ -47,7 +47,7 @@ def test_a_slow_ball_does_not_touch_an_arm_with_a_bad_goal(
     else:
         with pytest.raises(ValueError, match="controller: "):
             controller.set_goal(goal)
-    controller.set_obstacles(ball)
+    controller.set_obstacles(ball, valid_for=np.inf)
     motion = ss.integrate(controller, q, np.zeros(7), steps=4500)
     exact = ss.ExactClearance(robot, [ss.SceneObject("ball", "sphere", size=(0.05,))])
     times = np.arange(0, len(motion.q), 20)

@@ -139,7 +139,7 @@ def test_another_goal_begins_anew_and_a_way_that_opens_is_said(planar: ss.Arm) -
     motion = ss.integrate(controller, motion.last_q, motion.last_v, steps=800)
     assert ss.Activity.blocked not in motion.activities[:400]
     assert motion.activities[-1] == ss.Activity.blocked
-    controller.set_obstacles(ss.Obstacles.none())
+    controller.remove_obstacles()
     motion = ss.integrate(controller, motion.last_q, motion.last_v, steps=4000)
     # a look of the planner, 0.02 s, and 0.1 s in which it stays open
     assert motion.activities.index(ss.Activity.moving) <= 125

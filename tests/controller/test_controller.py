@@ -67,7 +67,8 @@ def test_clearances_bound_commands_without_a_goal(robot: ss.Robot, arm: ss.Arm) 
     q = robot.neutral
     hand = robot.pose(q, "fr3_hand")[:3, 3]
     controller = ss.Controller(arm, settings())
-    controller.set_obstacles(ss.Obstacles([hand + np.array([0.3, 0.0, 0.0])], [0.05], [[-0.1, 0.0, 0.0]]))
+    ball = ss.Obstacles([hand + np.array([0.3, 0.0, 0.0])], [0.05], [[-0.1, 0.0, 0.0]])
+    controller.set_obstacles(ball, valid_for=np.inf)
     motion = ss.integrate(controller, q, np.zeros(7), steps=4500)
     assert set(motion.activities) == {ss.Activity.no_goal}
     assert ss.SafetyStatus.clearance_lost not in motion.statuses
@@ -275,9 +276,7 @@ def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: s
     for planner in (OnlinePlannerSettings(), None):
         controller = ss.Controller(arm, settings(planner=planner))
         controller.set_goal(goal)
-        controller.set_obstacles(
-            [ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball], valid_for=np.inf
-        )
+        controller.set_obstacles([ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball], valid_for=np.inf)
         motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=16000)
         assert motion.activities[-1] == ss.Activity.blocked
         assert re.match(

@@ -26,8 +26,7 @@ def pushed(
     settings.tracking.stiffness = stiffness
     controller = ss.Controller(arm, settings)
     controller.set_goal(arm.neutral)
-    if obstacles is not None:
-        controller.set_obstacles(obstacles)
+    controller.set_obstacles(ss.Obstacles.none() if obstacles is None else obstacles)
     q, v = arm.neutral.copy(), np.zeros(arm.num_coordinates)
     way, torques, clearances = [], [], []
     for k in range(round(seconds / PERIOD)):

@@ -19,6 +19,7 @@ def arm():
 def controller_of(arm, goal=GOAL, **change):
     settings = ss.ControllerSettings(**{"period": PERIOD, "synchronous": True} | change)
     controller = ss.Controller(arm, settings)
+    controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(goal)
     return controller
 

@@ -8,6 +8,7 @@ namespace sidestep {
 namespace {
 
 constexpr double end_of_braking = 0.1;  // Time constant with which braking ends, as a share of the stop's [-].
+constexpr double braking_jerk = 0.9;    // Share of the jerk limit with which braking ends [-].
 constexpr double least_periods = 5.0;   // The same at least [periods].
 
 }  // namespace
@@ -53,7 +54,7 @@ void AttractorStage::write_braking(const Eigen::VectorXd& v, Eigen::VectorXd& wa
   const double last = std::max(end_of_braking * settings_.stop_time, least_periods * settings_.period);
   for (Eigen::Index j = 0; j < v.size(); ++j) {
     const double speed = std::abs(v[j]);
-    const double most = std::min(limits.acceleration[j], std::sqrt(limits.jerk[j] * speed));  // half the jerk: 2 (j / 2) |v|
+    const double most = std::min(limits.acceleration[j], std::sqrt(2.0 * braking_jerk * limits.jerk[j] * speed));
     wanted[j] = -std::copysign(std::min(most, speed / last), v[j]);
   }
 }

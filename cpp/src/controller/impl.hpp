@@ -120,7 +120,7 @@ class Controller::Impl {
   bool follow_arm(const Tick& tick) noexcept;
   void begin_motion() noexcept;
   /// The arm touched something: it begins anew where it is, and waits.
-  void judge_touch() noexcept;
+  void judge_touch(const Tick& tick) noexcept;
   /// The arm stops: the obstacles are old, or it touched something.
   bool must_rest() const noexcept { return sources_.is_stale() || touch_.is_touched(); }
   /// Activation distances, shorter where the arm is led; `looks`: it is time to look for what moves.

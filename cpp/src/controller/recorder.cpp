@@ -194,8 +194,8 @@ void Recorder::note(const Controller::Impl& newest) {
       if (set.number > noted_world_) {
         add(recording::obstacles_tag, to_record(set.number, *set.points));
       }
-      record.sources.push_back(
-          {set.name, set.id, set.number, set.heard_number, set.time, set.heard, set.valid_for, set.emptied, set.repeated});
+      record.sources.push_back({set.name, set.id, set.number, set.heard_number, set.time, set.heard, set.valid_for,
+                                set.moves_for, set.emptied, set.repeated});
     }
     add(recording::world_tag, record);
     noted_world_ = world->number;

@@ -74,11 +74,11 @@ void describe(auto& archive, Of<ObstaclesRecord> auto& o) {
 struct SourceRecord {
   std::string name;
   std::uint64_t id = 0, number = 0, heard_number = 0;
-  double time = 0.0, heard = 0.0, valid_for = 0.0;
+  double time = 0.0, heard = 0.0, valid_for = 0.0, moves_for = 0.0;
   bool emptied = false, repeated = false;
 };
 void describe(auto& archive, Of<SourceRecord> auto& s) {
-  archive(s.name, s.id, s.number, s.heard_number, s.time, s.heard, s.valid_for, s.emptied, s.repeated);
+  archive(s.name, s.id, s.number, s.heard_number, s.time, s.heard, s.valid_for, s.moves_for, s.emptied, s.repeated);
 }
 struct WorldRecord {
   std::uint64_t number = 0;

@@ -299,7 +299,7 @@ void Replay::give_world(std::uint64_t number) {
       throw std::invalid_argument("set " + std::to_string(record.number) + " of its source '" + record.name + "' is missing");
     }
     world.sources.push_back({record.name, record.id, record.number, record.time, record.heard, record.heard_number,
-                             record.valid_for, record.emptied, record.repeated, points->second});
+                             record.valid_for, record.moves_for, record.emptied, record.repeated, points->second});
     oldest = std::min(oldest, record.number);
   }
   world.obstacles = join(world.sources);

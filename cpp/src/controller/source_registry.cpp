@@ -10,7 +10,8 @@ namespace {
 
 constexpr double no_time = SourceOptions::untold;  // Time of a set that says nothing of how often they come.
 constexpr double longest_between = 1.0;            // Time between two sets beyond which they say nothing of velocities [s].
-constexpr double least_largest_speed = 1e-3;      // Largest speed that is assumed, at least: 0 is none that can be found [m/s].
+constexpr double least_largest_speed = 1e-3;  // Largest speed that is assumed, at least: 0 is none that can be found [m/s].
+constexpr int least_of_scene = 10;            // Sets of the scene in a row, each another one, after which more are expected.
 constexpr std::size_t longest_source_name = 100;  // Length of a source's name, at most.
 
 std::string quoted(const std::string& name) { return "'" + name + "'"; }
@@ -144,9 +145,12 @@ SourceRegistry::Entry& SourceRegistry::at_or_new(const std::string& source) {
 }
 
 void SourceRegistry::note(Entry& entry, double time) const noexcept {
-  const bool third = entry.last_but_one < entry.last && entry.last < time &&
-                     time - entry.last_but_one <= settings_.sources.valid_for;
+  const bool third =
+      entry.last_but_one < entry.last && entry.last < time && time - entry.last_but_one <= settings_.sources.valid_for;
   entry.comes = third || (entry.comes && time - entry.last < longest_between);  // after a while it begins anew
+  if (time != entry.last) {
+    entry.in_a_row = time - entry.last <= settings_.sources.valid_for && time > entry.last ? entry.in_a_row + 1 : 1;
+  }
   entry.last_but_one = entry.last;
   entry.last = time;
 }
@@ -155,7 +159,9 @@ double SourceRegistry::validity(const Entry& entry, const SourceOptions& options
   if (!std::isnan(options.valid_for)) {
     return options.valid_for;
   }
-  const bool ages = !std::isnan(options.time) || entry.comes || entry.given.tree().moves();
+  // A scene may be changed now and then, and rest; one that is changed again and again is what a camera sees.
+  const bool streams = entry.set.name == SourceOptions::scene ? entry.in_a_row >= least_of_scene : entry.comes;
+  const bool ages = !std::isnan(options.time) || streams || entry.given.tree().moves();
   return ages && std::isinf(settings_.obstacle_timeout) ? settings_.sources.valid_for : settings_.obstacle_timeout;
 }
 
@@ -184,9 +190,9 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
   entry.set.heard_number = ++number_;
 }
 
-void SourceRegistry::find_velocities(Entry& entry, const Obstacles& before, double last, double time) const {
+void SourceRegistry::find_velocities(Entry& entry, const Obstacles& before, double last, double time, bool has_time) const {
   const bool follows = time > last && time - last < longest_between;
-  if (!follows || !std::isfinite(entry.set.valid_for)) {  // the first one, or the first after a while
+  if (!follows || !(entry.comes || has_time)) {  // the first one, or the first after a while
     entry.motion.reset();
     return;
   }
@@ -195,6 +201,9 @@ void SourceRegistry::find_velocities(Entry& entry, const Obstacles& before, doub
     entry.motion->update(before, last);
   }
   VelocityEstimate::Result found = entry.motion->update(entry.given, time);
+  if (found.velocities != entry.given.velocities()) {
+    entry.set.moves_for = std::min(entry.set.valid_for, settings_.sources.valid_for);
+  }
   entry.set.points =
       std::make_shared<const Obstacles>(entry.given.moving(std::move(found.velocities), std::move(found.uncertainty)));
 }
@@ -209,9 +218,9 @@ void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOpti
   entry.set.number = entry.set.heard_number = ++number_;
   entry.set.time = entry.set.heard = options.time;
   entry.set.emptied = entry.set.repeated = false;
-  entry.set.valid_for = validity(entry, options);
-  if (!std::isnan(time)) {
-    find_velocities(entry, before, last, time);
+  entry.set.valid_for = entry.set.moves_for = validity(entry, options);
+  if (!std::isnan(time) && !std::isinf(options.valid_for)) {
+    find_velocities(entry, before, last, time, !std::isnan(options.time));
   }
 }
 

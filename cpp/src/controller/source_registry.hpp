@@ -42,7 +42,8 @@ class SourceRegistry {
     Obstacles given = Obstacles::none();          // as they were given
     double last = -1e300, last_but_one = -1e300;  // Times of the last two sets [s].
     double emptied_at = 0.0;                      // [s]
-    bool comes = false;                           // Sets come again and again.
+    bool comes = false;                           // Three sets came within the time for which they are valid.
+    int in_a_row = 0;                             // Number of sets, each soon after the one before.
     std::optional<VelocityEstimate> motion;       // Velocities that nobody told, from the second set on.
   };
 
@@ -51,8 +52,8 @@ class SourceRegistry {
   Entry& at_or_new(const std::string& source);
   /// Notes that a source was set at a time [s].
   void note(Entry& entry, double time) const noexcept;
-  /// Finds velocities that nobody told from the points before, which were set at `last` [s].
-  void find_velocities(Entry& entry, const Obstacles& before, double last, double time) const;
+  /// Finds velocities that nobody told from the points before, which were set at `last` [s]. `has_time`: they were given their time.
+  void find_velocities(Entry& entry, const Obstacles& before, double last, double time, bool has_time) const;
   /// Puts other points, which are believed at once; NaN as their time: not one of the sets that come again and again.
   void replace(Entry& entry, Obstacles obstacles, const SourceOptions& options, double time);
   double validity(const Entry& entry, const SourceOptions& options) const noexcept;

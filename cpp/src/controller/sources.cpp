@@ -78,14 +78,14 @@ void Sources::adopt(const Moment& now) noexcept {
     motion_.parts[k] = {};
   }
   for (std::size_t k = 0; k < num_known_; ++k) {
-    move(world, k, now.time - known_[k].time, world.sources[k].valid_for);
+    move(world, k, now.time - known_[k].time, world.sources[k].moves_for);
   }
 }
 
 void Sources::advance(World& world, const Moment& now) noexcept {
   for (std::size_t k = 0; k < std::min(num_known_, world.sources.size()); ++k) {
     if (!motion_.parts[k].frozen && !motion_.parts[k].hidden) {
-      move(world, k, now.elapsed, known_[k].time + world.sources[k].valid_for - (now.time - now.elapsed));
+      move(world, k, now.elapsed, known_[k].time + world.sources[k].moves_for - (now.time - now.elapsed));
     }
   }
 }

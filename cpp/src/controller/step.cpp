@@ -23,7 +23,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   reference_.hold(settings.output, tick);
   measured_.judge(reference_.next_q, last_.acceleration, tick);
   board_.show_measured(measured_.position());
-  judge_touch();
+  judge_touch(tick);
   dynamics_.observe(measured_.begins() || touch_.is_touched(), measured_.velocity(), last_, tick);
   bool& apart = state_.apart = follow_arm(tick);
 
@@ -41,8 +41,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   look_ahead(followed, tick, obstacles);
 
   // Desired = attractor(Target, World)
-  state_.attraction = attractor_.attract(lead(followed, must_rest(), tick), reference_, obstacles, sources_.closing(), tick,
-                                         state_.wanted);
+  state_.attraction =
+      attractor_.attract(lead(followed, must_rest(), tick), reference_, obstacles, sources_.closing(), tick, state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
@@ -111,10 +111,10 @@ bool Controller::Impl::follow_arm(const Tick& tick) noexcept {
   return apart;
 }
 
-void Controller::Impl::judge_touch() noexcept {
-  const bool touches =
-      touch_.judge({measured_.position(), measured_.velocity(), measured_.begins(), measured_.bridges_sample()},
-                   {last_.torque, dynamics_.mass(), dynamics_.model_bias()});
+void Controller::Impl::judge_touch(const Tick& tick) noexcept {
+  const bool touches = touch_.judge(
+      {measured_.position(), measured_.velocity(), tick.moved, measured_.begins() || tick.gap, measured_.bridges_sample()},
+      {last_.torque, dynamics_.mass(), dynamics_.model_bias()});
   if (touches) {
     measured_.restart();
     dynamics_.hold(touch_.explained_load());
@@ -149,15 +149,9 @@ void Controller::Impl::begin_motion() noexcept {
 }
 
 InputsStage::Moment Controller::Impl::moment(const NearReference& near, const Tick& tick) const noexcept {
-  return {reference_,
-          measured_.position(),
-          sources_.obstacles(),
-          near,
-          tick,
-          pace(tick),
-          measured_.agrees_with_reference(),
-          must_rest(),
-          look_ahead_.is_followed()};
+  return {
+      reference_,  measured_.position(),     sources_.obstacles(), near, tick, pace(tick), measured_.agrees_with_reference(),
+      must_rest(), look_ahead_.is_followed()};
 }
 
 void Controller::Impl::update_activation_distances(bool looks, const Obstacles& obstacles) noexcept {

@@ -18,8 +18,6 @@ constexpr double most_slip = 0.005;    // Way that the velocity does not explain
 constexpr double soft_share = 0.5;     // share of the allowed torque by which an arm that was touched resists [-]
 constexpr int least_samples = 3;       // samples of a touch, at least: loops of long periods
 
-int periods(double time, double period) noexcept { return static_cast<int>(std::ceil(time / period - 1e-9)); }
-
 }  // namespace
 
 TouchMemory::TouchMemory(Eigen::Index nv)
@@ -35,10 +33,8 @@ TouchJudge::TouchJudge(const Robot& robot, const JointKinds& joints, const Contr
     : TouchMemory(robot.num_coordinates()),
       robot_(robot),
       joints_(joints),
-      period_(settings.period),
       judges_(judges && std::isfinite(settings.contact.share)),
-      most_seeds_(periods(seeding, period_)),
-      most_lasts_(std::max(least_samples, periods(settings.contact.time, period_))),
+      least_lasting_(settings.contact.time),
       share_(settings.contact.share * robot.limits().effort),
       most_(of_sample * robot.limits().effort),
       resistance_(soft_share * share_),
@@ -51,7 +47,7 @@ bool TouchJudge::judge(const Sample& now, const Acted& acted) noexcept {
     return false;
   }
   if (now.begins) {
-    seeds = most_seeds_;
+    seeds = seeding;
     felt.setZero();
     moved.setZero();
     sign.setZero();
@@ -61,14 +57,15 @@ bool TouchJudge::judge(const Sample& now, const Acted& acted) noexcept {
   const bool repeats = now.q == last_q && now.v == last_v && !now.v.isZero(0.0);  // an old sample, however slow the arm is
   const bool counts = !now.begins && !now.bridged && !repeats && !gap && is_steady(now);
   gap = now.bridged || repeats;
-  acceleration_ = (now.v - last_v) / period_;
+  acceleration_ = (now.v - last_v) / now.elapsed;
   last_q = now.q;
   last_v = now.v;
   if (!counts) {
     lasts = 0;
+    lasted = 0.0;
     return false;
   }
-  const double filter = std::min(1.0, period_ / touch_filter);
+  const double filter = std::min(1.0, now.elapsed / touch_filter);
   double largest = 1.0;
   for (Eigen::Index j = 0; j < felt.size(); ++j) {
     const double inertia = acted.mass.row(j).dot(acceleration_), lacks = inertia + acted.bias[j] - acted.torque[j];
@@ -87,18 +84,20 @@ bool TouchJudge::judge(const Sample& now, const Acted& acted) noexcept {
       allowed = most;
     }
   }
-  if (largest > 1.0 && seeds == 0) {  // what exceeds what is allowed is not learnt
-    touched = ++lasts >= most_lasts_;
+  if (largest > 1.0 && !(seeds > 0.5 * now.elapsed)) {  // what exceeds what is allowed is not learnt
+    lasted += now.elapsed;
+    touched = ++lasts >= least_samples && lasted > least_lasting_ - 0.5 * now.elapsed;
     return touched;
   }
   lasts = 0;
-  learn(now.v, acted.mass);
+  lasted = 0.0;
+  learn(now, acted.mass);
   return false;
 }
 
 bool TouchJudge::is_steady(const Sample& now) const noexcept {
   for (Eigen::Index j = 0; j < last_q.size(); ++j) {
-    const double slip = std::abs(now.q[j] - last_q[j] - period_ * now.v[j]);
+    const double slip = std::abs(now.q[j] - last_q[j] - now.elapsed * now.v[j]);
     if (!(slip <= (joints_.slides(j) ? prismatic_way : 1.0) * most_slip)) {
       return false;
     }
@@ -106,9 +105,10 @@ bool TouchJudge::is_steady(const Sample& now) const noexcept {
   return true;
 }
 
-void TouchJudge::learn(const Eigen::VectorXd& v, const Eigen::MatrixXd& mass) noexcept {
-  if (seeds > 0) {
-    --seeds;
+void TouchJudge::learn(const Sample& now, const Eigen::MatrixXd& mass) noexcept {
+  const Eigen::VectorXd& v = now.v;
+  if (seeds > 0.5 * now.elapsed) {
+    seeds -= now.elapsed;
     load += rest_;
     return;
   }
@@ -119,7 +119,7 @@ void TouchJudge::learn(const Eigen::VectorXd& v, const Eigen::MatrixXd& mass) no
       const double moves = std::min(mass(j, j), std::abs(mass(j, k))) * std::abs(v[k]);
       speed = std::max(speed, joints_.slides(k) ? moves / prismatic_way : moves);
     }
-    const double share = std::min(1.0, period_ * speed / (way * mass(j, j)));
+    const double share = std::min(1.0, now.elapsed * speed / (way * mass(j, j)));
     const double change = share / (1.0 + sign[j] * sign[j]) * rest_[j];
     if (!std::isfinite(change)) {
       continue;
@@ -131,7 +131,7 @@ void TouchJudge::learn(const Eigen::VectorXd& v, const Eigen::MatrixXd& mass) no
 
 void TouchJudge::go_on_from(const TouchJudge& before) noexcept {
   static_cast<TouchMemory&>(*this) = before;
-  seeds = most_seeds_;  // another body weighs something else
+  seeds = seeding;  // another body weighs something else
 }
 
 std::string TouchJudge::explain() const {

@@ -16,8 +16,9 @@ struct TouchMemory {
   Eigen::VectorXd last_q, last_v;     // State of the last sample that counts.
   Eigen::VectorXd felt, moved, sign;  // Filtered: torque that the model lacks, M v̇, direction of motion [Nm | N], [-].
   Eigen::VectorXd load, friction;     // What explains the torque that the model lacks [Nm | N].
-  int seeds = 0;                      // Periods left in which all that is felt counts as load.
-  int lasts = 0;                      // Periods in a row beyond what is allowed.
+  double seeds = 0.0;                 // Time left in which all that is felt counts as load [s].
+  double lasted = 0.0;                // Time of samples in a row beyond what is allowed [s].
+  int lasts = 0;                      // Number of these samples.
   bool gap = true;                    // The last sample does not count.
   bool touched = false;               // Until `release`.
   Eigen::Index joint = 0;             // Joint that felt the touch.
@@ -40,10 +41,11 @@ class TouchJudge : private TouchMemory {
   /// `judges`: whether the arm is moved by torque, and not made to be pushed.
   TouchJudge(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool judges);
 
-  /// A sample of the arm. `begins`: nothing before it counts; `bridged`: it is no measurement.
+  /// A sample of the arm, `elapsed` [s] after the one before. `begins`: nothing before it counts; `bridged`: it is no measurement.
   struct Sample {
     const Eigen::VectorXd& q;
     const Eigen::VectorXd& v;
+    double elapsed;
     bool begins = false, bridged = false;
   };
   /// What acted on the arm in the period before: the torque sent, the mass matrix with rotors, the bias of the model.
@@ -69,15 +71,14 @@ class TouchJudge : private TouchMemory {
  private:
   /// Whether the position moved as the velocity says: else time has passed that nobody told.
   bool is_steady(const Sample& now) const noexcept;
-  void learn(const Eigen::VectorXd& v, const Eigen::MatrixXd& mass) noexcept;
+  void learn(const Sample& now, const Eigen::MatrixXd& mass) noexcept;
 
   const Robot& robot_;
   const JointKinds& joints_;
-  const double period_;
   const bool judges_;
-  const int most_seeds_, most_lasts_;
-  Eigen::VectorXd share_;  // Torque that is a model's error, beside friction [Nm | N].
-  Eigen::VectorXd most_;   // Largest change of d that one sample shows [Nm | N].
+  const double least_lasting_;  // Time that a touch lasts, at least [s].
+  Eigen::VectorXd share_;       // Torque that is a model's error, beside friction [Nm | N].
+  Eigen::VectorXd most_;        // Largest change of d that one sample shows [Nm | N].
   Eigen::VectorXd resistance_;
   Eigen::VectorXd acceleration_, rest_;
 };

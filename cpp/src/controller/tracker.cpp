@@ -21,6 +21,8 @@ constexpr double free_share = 0.2;       // share of the largest error from whic
 constexpr double prismatic_share = 0.2;  // the same of prismatic joints, as a share of that [m/rad]
 constexpr double rate_rounding = 1e-9;   // relative excess of a torque's largest change that is rounding of the program [-]
 constexpr double most_per_period = 0.2;  // feedback's frequency × period, at most: a slow rate holds its torques for long [-]
+// Time constant of the filter of the way back of a velocity stream: noise of the position must not reach its jerk [s].
+constexpr double drift_filter = 0.05;
 
 }  // namespace
 
@@ -65,8 +67,8 @@ void Tracker::write_coupling(const Reference& reference, const Eigen::VectorXd& 
   }
 }
 
-bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque,
-                    const Tick& tick, Reference& reference) const noexcept {
+bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque, const Tick& tick,
+                    Reference& reference) const noexcept {
   const double w = largest_frequency(tick);
   // By the least change of each joint's torque ω² (M e)_j that is too large, one after the other.
   bool moved = false;
@@ -183,10 +185,12 @@ bool Tracker::keep_torque_rate(const LastOutput& last, const ArmDynamics& dynami
 
 void Tracker::write_velocity(const Reference& reference, const Eigen::VectorXd& arm_q, bool known, const Tick& tick,
                              Eigen::VectorXd& velocity) noexcept {
+  const double filter = std::min(1.0, tick.period / drift_filter);
   for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
     const double last = reference.v[j] + drift_[j], step = limits_.acceleration[j] * tick.period;
     const double most = std::max(limits_.velocity[j], std::abs(reference.next_v[j]));
-    const double wanted = reference.next_v[j] + (known ? settings_.tracking.drift_gain * (reference.q[j] - arm_q[j]) : 0.0);
+    const double drift = known ? settings_.tracking.drift_gain * (reference.q[j] - arm_q[j]) : 0.0;
+    const double wanted = reference.next_v[j] + drift_[j] + filter * (drift - drift_[j]);
     velocity[j] = std::clamp(std::clamp(wanted, last - step, last + step), -most, most);
   }
   drift_ = velocity - reference.next_v;

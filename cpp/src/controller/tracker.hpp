@@ -33,8 +33,8 @@ class Tracker {
 
   /// Moves the reference to where feedback pushes the arm at q (nv) by no more than `torque` (nv) [Nm | N]; M: mass matrix. False
   /// where it is there already.
-  bool yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque,
-             const Tick& tick, Reference& reference) const noexcept;
+  bool yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, const Eigen::VectorXd& torque, const Tick& tick,
+             Reference& reference) const noexcept;
 
   /// The arm at the moment of a step, where it is not exactly where the reference is.
   struct Arm {

@@ -21,6 +21,7 @@ struct SourceSet {
   double heard = 0.0;                // the same of the newest set, which may be empty and not believed
   std::uint64_t heard_number = 0;
   double valid_for = 0.0;  // [s]; inf: for ever
+  double moves_for = 0.0;  // Time for which its points move on along their velocities, at most [s].
   bool emptied = false;    // newer sets are empty
   bool repeated = false;   // newer sets are the same, although their points move
   std::shared_ptr<const Obstacles> points;

@@ -51,7 +51,13 @@ BOOST_AUTO_TEST_CASE(a_path_that_is_kept_a_way_out_and_a_stop_take_the_place_of_
   const AvoidanceTrajectory aside(a.model.arm.robot().limits(), a.reference.q, a.reference.v, Eigen::Vector2d(-1.0, 1.0));
   const Eigen::VectorXd followed = aside.acceleration(a.reference.q, a.reference.v, a.settings.period);
   BOOST_TEST((a.attract({a.goal, &aside, nullptr}) - followed).norm() < attracted_rounding);
-  const Eigen::VectorXd stop = -a.reference.v / a.settings.stop_time;
+  // As fast as acceleration and jerk allow, and at the end with a tenth of the stop's time constant.
+  const JointLimits& limits = a.model.arm.robot().limits();
+  Eigen::VectorXd stop = -a.reference.v / (0.1 * a.settings.stop_time);
+  for (Eigen::Index j = 0; j < stop.size(); ++j) {
+    const double most = std::min(limits.acceleration[j], std::sqrt(1.8 * limits.jerk[j] * std::abs(a.reference.v[j])));
+    stop[j] = std::clamp(stop[j], -most, most);
+  }
   BOOST_TEST((a.attract({a.goal, nullptr, &kept, 1.0, true}) - stop).norm() < attracted_rounding);
 }
 

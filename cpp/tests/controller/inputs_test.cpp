@@ -310,7 +310,7 @@ BOOST_AUTO_TEST_CASE(keep_path_waits_before_what_blocks_it_and_goes_on_when_that
   BOOST_TEST(model.q[0] > bent()[0] + 0.3);
   BOOST_TEST(least > 0.003);
   BOOST_TEST(most < 1e-3);
-  controller.set_obstacles(Obstacles::none());
+  controller.remove_obstacles("scene");
   for (int k = 0; k < 2500; ++k) {
     model.step(controller);
     most = std::max(most, off(model.q, bent(), end));

@@ -1,6 +1,7 @@
 // Whole motions: they repeat, arrive with every part left out, take the short way round, and reach poses.
 #include "sidestep/controller/motion.hpp"
 
+#include <limits>
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <chrono>
@@ -263,7 +264,9 @@ BOOST_AUTO_TEST_CASE(poses_are_reached_in_a_free_workspace) {
 
 BOOST_AUTO_TEST_CASE(a_posture_that_is_searched_for_an_old_goal_is_not_followed) {
   const Arm arm = covered_arm(test::arm_limits(nv));
-  Controller controller(arm);  // with its worker
+  ControllerSettings settings;
+  settings.contact.share = std::numeric_limits<double>::infinity();  // the arm here stays where it is, as one that is held
+  Controller controller(arm, settings);                              // with its worker
   controller.set_obstacles(Obstacles::none());
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   Random random(5);

@@ -25,7 +25,7 @@ struct Seeing {
   }
   Eigen::Vector3d point(Eigen::Index k = 0) const { return sources.obstacles().points().col(k); }
 
-  const Eigen::Vector2d upright{0.0, 0.0};
+  const Eigen::VectorXd upright = Eigen::Vector2d::Zero();
   const ControllerModel model;
   TripleBuffer<World> buffer{World{}};
   SourceRegistry registry{model.settings};
@@ -95,7 +95,7 @@ BOOST_AUTO_TEST_CASE(a_told_velocity_is_not_believed_for_longer_than_it_is_valid
   BOOST_TEST(std::abs(seen.point().x() - 4.75) < 1e-9);
   BOOST_TEST((seen.sources.obstacles().velocities().col(0).isZero(0.0)));  // it stands still
   BOOST_TEST(seen.sources.explain().find("source 'tracker' is 0.74 s old and valid for 0.25 s") != std::string::npos);
-  seen.set(test::ball(far_place, 0.1, velocity), {.source = "tracker"});
+  seen.set(test::ball({4.2, 0.0, 1.0}, 0.1, velocity), {.source = "tracker"});
   seen.update();
   BOOST_TEST(!seen.sources.is_stale());
 }

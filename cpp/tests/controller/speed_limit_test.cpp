@@ -54,7 +54,7 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
   settings.synchronous = true;
   Controller controller(arm, settings);
   controller.set_obstacles(Obstacles::none());
-  controller.set_obstacles(obstacles);
+  controller.set_obstacles(obstacles, test::for_ever);
   if (goal) {
     controller.set_goal(*goal);
   }

@@ -117,7 +117,8 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
             0) {  // comes from afar at the middle of the arm where it will be, too large and too fast for it to back off
           const KinematicState there = state_at(arm.robot(), k % 2 == 0 ? left : right);
           const Eigen::Vector3d at = frame_pose(arm.robot(), there, arm.robot().frame_index("link4")).translation();
-          controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.25, {0.0, -3.0, 0.0}), test::for_ever);
+          controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.001 * (k % 11)), 0.25, {0.0, -3.0, 0.0}),
+                                   test::for_ever);
         } else {
           controller.set_obstacles(random_balls(random, 1 + k % 4, 0.0));
         }

@@ -36,7 +36,7 @@ struct Feeling {
     return feel();
   }
   bool feel(bool bridged = false) {
-    const bool touches = judge.judge({q, v, begins, bridged}, {torque, mass, bias});
+    const bool touches = judge.judge({q, v, settings.period, begins, bridged}, {torque, mass, bias});
     begins = false;
     return touches;
   }

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "sidestep/attractor/goal.hpp"
 #include "sidestep/arm/arm.hpp"
+#include "sidestep/controller/source.hpp"
 #include "sidestep/scene/obstacles.hpp"
 #include "support/serial_arm.hpp"
 

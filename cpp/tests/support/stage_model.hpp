@@ -45,7 +45,7 @@ inline Reference reference_at(const Eigen::VectorXd& q, const Eigen::VectorXd& v
 inline World world_of(Obstacles obstacles, std::uint64_t number = 1) {
   World world{number, obstacles, {}};
   world.sources.push_back({"scene", 1, number, SourceOptions::untold, SourceOptions::untold, number,
-                           std::numeric_limits<double>::infinity(), false, false, std::make_shared<const Obstacles>(obstacles)});
+                           for_ever.valid_for, for_ever.valid_for, false, false, std::make_shared<const Obstacles>(obstacles)});
   return world;
 }
 

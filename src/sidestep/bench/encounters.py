@@ -18,7 +18,6 @@ from sidestep.bench.motion import Motion, MotionSettings
 from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import poses_over
 from sidestep.bench.sensor_fault import SensorFault, fastest_contact, first_word
-from sidestep.bench.timed_calls import step_at
 from sidestep.distance import ExactClearance, SceneObject
 from sidestep.robot import Robot
 
@@ -204,7 +203,7 @@ def run_encounter(
         encounter.tell(controller, step, q)
         sensed = encounter.sense(step, q, v)
         if sensed is not None or not statuses:
-            step_at(controller, *(sensed or (q, v)), step * PERIOD)
+            controller.step(*(sensed or (q, v)), time=step * PERIOD)
         command = controller.command
         values = q, v, command.acceleration, command.torque, command.position
         for name, value in zip(columns, values, strict=True):

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from sidestep._core import Controller, Obstacles
 from sidestep.bench.encounters import PERIOD
 from sidestep.bench.sensor_fault import SensorFault
-from sidestep.bench.timed_calls import set_stamped
 from sidestep.distance import SceneObject
 from sidestep.obstacles import Shape
 
@@ -106,7 +105,7 @@ class Tracker:
         elif self._arrives(step, captured):
             captured = max(0.0, captured)
             stamp = captured if self.told is Told.late_stamped else now
-            set_stamped(controller, self._set(now, captured), "tracker", time=stamp, valid_for=VALID_FOR)
+            controller.set_obstacles(self._set(now, captured), "tracker", time=stamp, valid_for=VALID_FOR)
 
     def _arrives(self, step: int, captured: float) -> bool:
         if self.told is Told.lost30:

@@ -68,12 +68,16 @@ def obstacles_from_shapes(
     groups = [group for part in parts for group in part[3]]
     runs = [list(run) for _, run in groupby(groups, key=lambda group: group[0])]
     return Obstacles(points, radii, velocities).named(
-        [run[0][0] for run in runs], [sum(group[1] for group in run) for run in runs], [run[0][2] for run in runs]
+        [run[0][0] for run in runs],
+        [sum(group[1] for group in run) for run in runs],
+        [run[0][2] for run in runs],
     )
 
 
 Sampling = tuple[float, float] | None  # spacing and radius [m], or None: by excess
-Part = tuple[Points, Points, Points, list[tuple[str, int, Points]]]  # points, radii, velocities; name, count, pose
+Part = tuple[
+    Points, Points, Points, list[tuple[str, int, Points]]
+]  # points, radii, velocities; name, count, pose
 
 
 def _listed(items: Seen) -> list[Obstacles | Shape]:

@@ -199,7 +199,7 @@ class PointTree {
     alignas(64) std::array<float, leaf_size> values;
     const Balls points{coordinate(0), coordinate(1), coordinate(2), radii()};
     const int first = node * leaf_size;
-    unsigned near = measure(points, first, std::min(leaf_size, size() - first), found.distance, values.data());
+    unsigned near = measure(points, first, count(node), found.distance, values.data());
     for (; near != 0; near &= near - 1) {
       const int i = std::countr_zero(near);
       if (values[static_cast<std::size_t>(i)] < found.distance) {
