@@ -17,6 +17,7 @@ SOURCES = (
     "controller/plausibility.cpp",
     "controller/sources.cpp",
     "controller/speed_limiter.cpp",
+    "controller/touch_judge.cpp",
     "controller/trajectory_follower.cpp",
     "controller/words.cpp",
     "attractor/diagnosis.cpp",

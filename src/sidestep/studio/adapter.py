@@ -10,7 +10,15 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller, ControllerSettings, GeometricSystem, Obstacles, PoseGoal
+from sidestep._core import (
+    Activity,
+    Controller,
+    ControllerSettings,
+    GeometricSystem,
+    Obstacles,
+    PoseGoal,
+    SafetyStatus,
+)
 from sidestep.arm import Arm
 from sidestep.robot import Robot
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
@@ -104,6 +112,9 @@ class ControllerAdapter:
         self._near = q
         self._aim = q if pose is None else PoseTarget(self._robot, self._tip, pose, rest=q)
         self._controller.set_goal(self._goal)
+        last = self._controller.command
+        if (last.status, last.activity) == (SafetyStatus.stopping, Activity.waiting):  # after a touch
+            self._controller.restart()
         self._said = None
 
     @property
