@@ -40,7 +40,7 @@ void warn_of_obstacles(const Controller& controller) {
 
 void bind_sources(nb::module_& m) {
   nb::class_<SourceState>(m, "SourceState", "What a controller believes of a source of obstacles.")
-      .def_ro("name", &SourceState::name)
+      .def_ro("name", &SourceState::name, "As `set_obstacles` was told.")
       .def_ro("size", &SourceState::size, "Number of points.")
       .def_ro("age", &SourceState::age, "Time since what is believed was captured [s].")
       .def_ro("valid_for", &SourceState::valid_for, "Age up to which it is believed [s]; inf: for ever.")

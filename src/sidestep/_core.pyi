@@ -3688,7 +3688,8 @@ class SourceState:
     """What a controller believes of a source of obstacles."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """As `set_obstacles` was told."""
 
     @property
     def size(self) -> int:

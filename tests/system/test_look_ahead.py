@@ -40,7 +40,7 @@ def run(robot, obstacles, steps, *, seed=0, look_ahead=True):
         settings.look_ahead = None
     controller = ss.Controller(ss.Arm.from_robot(robot), settings)
     controller.set_goal(GOAL)
-    controller.set_obstacles(obstacles)
+    controller.set_obstacles(obstacles, valid_for=np.inf)
     return ss.integrate(controller, GOAL, np.zeros(2), steps=steps)
 
 

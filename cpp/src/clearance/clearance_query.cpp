@@ -99,7 +99,7 @@ double ClearanceQuery::nearest_moving(ConstVectorRef q, const Obstacles& obstacl
     return nearest;
   }
   place(q, w);
-  for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
+  for (const Eigen::Index n : obstacles.movers()) {
     const double speed = obstacles.velocities().col(n).norm();
     for (int i = 0; speed > 0.0 && i < items_->num_obstacles(); ++i) {
       const int link = (*items_)[i].link;

@@ -46,12 +46,14 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
     }
   }
   tree_ = PointTree(points_, radii_, velocities_);
+  find_movers();
 }
 
 Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
                               Eigen::VectorXd uncertainty, std::vector<int> order) {
   Obstacles made(std::move(points), std::move(radii), std::move(velocities));
   made = made.moving(made.velocities_, std::move(uncertainty));
+  std::erase(order, -1);
   std::vector<int> sorted = order;
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t n = 0; n < sorted.size(); ++n) {
@@ -59,7 +61,9 @@ Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Ei
       throw std::invalid_argument("obstacles: the order has another number than each point once");
     }
   }
-  if (order != made.tree_.order()) {
+  std::vector<int> usual = made.tree_.order();
+  std::erase(usual, -1);
+  if (order != usual) {
     made.tree_ = PointTree(made.points_, made.radii_, made.velocities_, std::move(order));
   }
   return made;
@@ -97,6 +101,7 @@ Obstacles Obstacles::join(const std::vector<const Obstacles*>& sets) {
     at += count;
   }
   joined.tree_ = PointTree::join(trees);
+  joined.find_movers();
   joined.names_ = std::move(names);
   return joined;
 }
@@ -113,9 +118,23 @@ Obstacles Obstacles::moving(Eigen::Matrix3Xd velocities, Eigen::VectorXd uncerta
     copy.velocities_ = std::move(velocities);
     copy.uncertainty_ = std::move(uncertainty);
     copy.tree_ = PointTree(copy.points_, copy.radii_, copy.velocities_, tree_.order());
+    copy.find_movers();
     copy.version_ = next_version();
   }
   return copy;
+}
+
+void Obstacles::find_movers() {
+  movers_.clear();
+  mover_begins_ = {0};
+  for (std::size_t part = 0; part < num_parts(); ++part) {
+    for (Eigen::Index n = begins_[part]; moves(part) && n < begins_[part + 1]; ++n) {
+      if (!velocities_.col(n).isZero(0.0)) {
+        movers_.push_back(n);
+      }
+    }
+    mover_begins_.push_back(static_cast<Eigen::Index>(movers_.size()));
+  }
 }
 
 Obstacles Obstacles::frozen() const {
@@ -201,13 +220,15 @@ bool Obstacles::advance(std::size_t part, double duration) noexcept {
   if (!moves(part)) {
     return true;
   }
-  const Eigen::Index begin = begins_[part], count = begins_[part + 1] - begin;
-  auto points = points_.middleCols(begin, count);
-  const auto velocities = velocities_.middleCols(begin, count);
-  if (!all_finite(points + duration * velocities)) {
-    return false;
+  const auto first = static_cast<std::size_t>(mover_begins_[part]), end = static_cast<std::size_t>(mover_begins_[part + 1]);
+  for (std::size_t k = first; k < end; ++k) {
+    if (!all_finite(points_.col(movers_[k]) + duration * velocities_.col(movers_[k]))) {
+      return false;
+    }
   }
-  points += duration * velocities;
+  for (std::size_t k = first; k < end; ++k) {
+    points_.col(movers_[k]) += duration * velocities_.col(movers_[k]);
+  }
   tree_.advance(part, duration);
   version_ = next_version();
   return true;

@@ -86,24 +86,36 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
                      std::vector<int> order)
-    : num_points_(static_cast<int>(order.size())),
-      order_(std::move(order)),
-      fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
-  if (order_.empty()) {
+    : fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
+  std::erase(order, -1);
+  num_points_ = static_cast<int>(order.size());
+  if (order.empty()) {
     return;
   }
+  // What moves stands behind what rests, in nodes of its own: only these are moved and fitted again.
+  const auto moving = std::stable_partition(order.begin(), order.end(), [&](int n) { return velocities.col(n).isZero(0.0); });
+  const auto num_resting = static_cast<std::size_t>(moving - order.begin());
+  std::size_t resting_leaves = groups(num_resting, leaf_size);
+  if (num_resting > 0 && moving != order.end()) {
+    resting_leaves = groups(resting_leaves, fan_out) * fan_out;
+  }
+  const std::size_t moving_leaves = groups(order.size() - num_resting, leaf_size), leaves = resting_leaves + moving_leaves;
   common_radius_ = (radii.array() == radii[0]).all() ? radii[0] : -1.0;
-  const std::size_t leaves = groups(order_.size(), leaf_size);
+  order_.assign(leaves * leaf_size, -1);
+  counts_.assign(leaves, 0);
   for (std::size_t c = 0; c < num_columns; ++c) {
     columns_[c].assign(leaves * leaf_size, c < 3 ? padding : 0.0);
-    for (std::size_t n = 0; n < order_.size(); ++n) {
+  }
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::size_t n = k < num_resting ? k : k - num_resting + resting_leaves * leaf_size;
+    order_[n] = order[k];
+    ++counts_[n / leaf_size];
+    for (std::size_t c = 0; c < num_columns; ++c) {
       const auto axis = static_cast<Eigen::Index>(c);
-      columns_[c][n] = c < 3 ? points(axis, order_[n]) : c == 3 ? radii[order_[n]] : velocities(axis - 4, order_[n]);
+      columns_[c][n] = c < 3 ? points(axis, order[k]) : c == 3 ? radii[order[k]] : velocities(axis - 4, order[k]);
     }
   }
-  counts_.assign(leaves, leaf_size);
-  counts_.back() = static_cast<int>(order_.size()) - static_cast<int>(leaves - 1) * leaf_size;
-  parts_ = {{0, static_cast<int>(leaves), fastest_}};
+  parts_ = {{0, static_cast<int>(leaves), static_cast<int>(resting_leaves), fastest_}};
   build(leaves);
 }
 
@@ -115,9 +127,10 @@ PointTree PointTree::join(const std::vector<const PointTree*>& trees) {
     for (std::size_t k = 0; k < tree->parts_.size(); ++k) {
       joined.parts_.push_back(tree->parts_[k]);
       joined.parts_.back().first_leaf += static_cast<int>(begin);
+      joined.parts_.back().first_moving += static_cast<int>(begin);
     }
     if (tree->parts_.empty()) {
-      joined.parts_.emplace_back(Part{static_cast<int>(begin), 0});
+      joined.parts_.emplace_back(Part{static_cast<int>(begin), 0, static_cast<int>(begin)});
       continue;
     }
     const std::size_t leaves = groups(begin + tree->counts_.size(), fan_out) * fan_out;
@@ -148,7 +161,7 @@ void PointTree::build(std::size_t num_leaves) {
   while (levels_.back().size > 1) {
     levels_.emplace_back(static_cast<int>(groups(static_cast<std::size_t>(levels_.back().size), fan_out)));
   }
-  refit({0, static_cast<int>(num_leaves)});
+  refit(0, static_cast<int>(num_leaves));
 }
 
 PointTree::Level::Level(int count) : size(count) {
@@ -161,8 +174,7 @@ PointTree::Level::Level(int count) : size(count) {
   radius.assign(padded, 0.0);
 }
 
-void PointTree::refit(const Part& part) noexcept {
-  int first = part.first_leaf, end = part.first_leaf + part.num_leaves;
+void PointTree::refit(int first, int end) noexcept {
   for (std::size_t level = 0; level < levels_.size(); ++level) {
     for (int node = first; node < end; ++node) {
       fit(level, node);
@@ -216,17 +228,16 @@ void PointTree::advance(std::size_t part, double duration) noexcept {
   if (!(moved.fastest > 0.0)) {
     return;
   }
-  const auto begin = static_cast<std::size_t>(moved.first_leaf) * leaf_size;
-  for (std::size_t leaf = 0; leaf < static_cast<std::size_t>(moved.num_leaves); ++leaf) {
-    const std::size_t first = begin + leaf * leaf_size;
-    const std::size_t end = first + static_cast<std::size_t>(count(moved.first_leaf + static_cast<int>(leaf)));
-    for (std::size_t n = first; n < end; ++n) {
+  const int end = moved.first_leaf + moved.num_leaves;
+  for (int leaf = moved.first_moving; leaf < end; ++leaf) {
+    const std::size_t first = static_cast<std::size_t>(leaf) * leaf_size;
+    for (std::size_t n = first; n < first + static_cast<std::size_t>(count(leaf)); ++n) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         columns_[axis][n] += duration * columns_[4 + axis][n];
       }
     }
   }
-  refit(moved);
+  refit(moved.first_moving, end);
 }
 
 void PointTree::freeze(std::size_t part) noexcept {
@@ -247,7 +258,7 @@ void PointTree::hide(std::size_t part) noexcept {
     std::fill_n(begin, std::ptrdiff_t{hidden.num_leaves} * leaf_size, padding);
   }
   std::fill_n(counts_.begin() + hidden.first_leaf, hidden.num_leaves, 0);
-  refit(hidden);
+  refit(hidden.first_leaf, hidden.first_leaf + hidden.num_leaves);
 }
 
 void PointTree::find_fastest() noexcept {

@@ -47,6 +47,8 @@ class Obstacles {
   const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
   /// How far the true velocity of each point may be from its velocity (N) [m/s].
   const Eigen::VectorXd& uncertainty() const noexcept { return uncertainty_; }
+  /// Points that had a velocity when they were given; those of parts that stand still have none now.
+  const std::vector<Eigen::Index>& movers() const noexcept { return movers_; }
   /// Number of points before those of part k, 0 <= k <= num_parts(), and of parts: one, unless sets were joined.
   Eigen::Index part_begin(std::size_t k) const noexcept { return begins_[k]; }
   std::size_t num_parts() const noexcept { return begins_.size() - 1; }
@@ -90,9 +92,10 @@ class Obstacles {
   void hide(std::size_t part) noexcept;
 
  private:
-  Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0), uncertainty_(0), begins_{0, 0} {}
+  Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0), uncertainty_(0), begins_{0, 0}, mover_begins_{0, 0} {}
 
   static std::uint64_t next_version() noexcept;
+  void find_movers();
 
   /// names[k] is of the points from ends[k - 1], from 0 for the first, to before ends[k].
   struct Names {
@@ -105,7 +108,9 @@ class Obstacles {
   Eigen::VectorXd radii_;
   Eigen::Matrix3Xd velocities_;
   Eigen::VectorXd uncertainty_;
-  std::vector<Eigen::Index> begins_;  // Number of points before those of each part, and of all.
+  std::vector<Eigen::Index> begins_;        // Number of points before those of each part, and of all.
+  std::vector<Eigen::Index> movers_;        // Points with a velocity, part by part.
+  std::vector<Eigen::Index> mover_begins_;  // Number of movers before those of each part, and of all.
   PointTree tree_;
   std::shared_ptr<const Names> names_;
   std::uint64_t version_ = next_version();

@@ -31,6 +31,7 @@ class PointTree {
   /// A part that moves by itself: all of a tree, or one of those that were joined.
   struct Part {
     int first_leaf = 0, num_leaves = 0;
+    int first_moving = 0;  // Leaf from which on its points move; those before rest.
     double fastest = 0.0;  // speed of a point [m/s], at most
   };
 
@@ -141,8 +142,8 @@ class PointTree {
 
   /// Makes the levels above `num_leaves` leaves, and fits them.
   void build(std::size_t num_leaves);
-  /// Fits the leaves of a part, and all nodes above them.
-  void refit(const Part& part) noexcept;
+  /// Fits the leaves from `first` to before `end`, and all nodes above them.
+  void refit(int first, int end) noexcept;
   void fit(std::size_t level, int node) noexcept;
   void find_fastest() noexcept;
 
