@@ -269,6 +269,7 @@ def test_results_of_workers_are_replayed_at_the_steps_that_took_them(arm, tmp_pa
 @pytest.mark.slow
 def test_a_posture_for_a_pose_is_replayed(arm, tmp_path):
     controller = ss.Controller(arm)
+    controller.set_obstacles(ss.Obstacles.none())
     with controller.record(tmp_path / "run.step"):
         controller.set_goal(ss.PoseGoal(arm.robot, "fr3_hand", arm.robot.pose(Q + 0.2, "fr3_hand")))
         q, v, steps = Q, np.zeros(7), 0

@@ -400,4 +400,6 @@ def test_what_leads_a_velocity_back_is_within_its_limits(arm: ss.Arm) -> None:
         assert (np.abs(command.velocity) <= arm.limits.velocity).all()
         before = command.velocity
         if k == 90:
-            assert command.velocity[0] == pytest.approx(-0.015, abs=0.001)  # drift_gain 2/s, 90 ms of a filter of 50
+            assert command.velocity[0] == pytest.approx(
+                -0.015, abs=0.001
+            )  # drift_gain 2/s, 90 ms of a filter of 50

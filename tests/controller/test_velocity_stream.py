@@ -22,7 +22,9 @@ def test_jerk_of_the_velocity_stream_is_within_its_limit_under_noise(
     controller.set_goal(goal)
     q, v, sent = arm.neutral.copy(), np.zeros(7), []
     for _ in range(2500):
-        command = controller.step(q + rng.normal(scale=q_noise, size=7), v + rng.normal(scale=v_noise, size=7))
+        command = controller.step(
+            q + rng.normal(scale=q_noise, size=7), v + rng.normal(scale=v_noise, size=7)
+        )
         sent.append(np.array(command.velocity))
         v = np.array(command.velocity) if output == "velocity" else (np.array(command.position) - q) / PERIOD
         q = q + PERIOD * v

@@ -112,9 +112,9 @@ bool Controller::Impl::follow_arm(const Tick& tick) noexcept {
 }
 
 void Controller::Impl::judge_touch(const Tick& tick) noexcept {
-  const bool touches = touch_.judge(
-      {measured_.position(), measured_.velocity(), tick.moved, measured_.begins() || tick.gap, measured_.bridges_sample()},
-      {last_.torque, dynamics_.mass(), dynamics_.model_bias()});
+  const bool touches = touch_.judge({measured_.position(), measured_.velocity(), tick.moved, measured_.begins() || tick.gap,
+                                     measured_.bridges_sample(), !tick.is_as_expected()},
+                                    {last_.torque, dynamics_.mass(), dynamics_.model_bias()});
   if (touches) {
     measured_.restart();
     dynamics_.hold(touch_.explained_load());

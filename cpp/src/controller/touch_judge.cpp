@@ -16,6 +16,7 @@ constexpr double of_moved = 0.2;       // share of M v̇ that a payload or rotor
 constexpr double of_sample = 2.5;      // what one sample shows, at most, in effort limits: alone it is no touch [-]
 constexpr double most_slip = 0.005;    // Way that the velocity does not explain: five times an encoder's noise [rad].
 constexpr double soft_share = 0.5;     // share of the allowed torque by which an arm that was touched resists [-]
+constexpr int after_late = 5;          // samples that do not count from one on that came late: the arm is led back in them
 constexpr int least_samples = 3;       // samples of a touch, at least: loops of long periods
 
 }  // namespace
@@ -55,7 +56,8 @@ bool TouchJudge::judge(const Sample& now, const Acted& acted) noexcept {
     friction.setZero();
   }
   const bool repeats = now.q == last_q && now.v == last_v && !now.v.isZero(0.0);  // an old sample, however slow the arm is
-  const bool counts = !now.begins && !now.bridged && !repeats && !gap && is_steady(now);
+  unsteady = now.late ? after_late : std::max(0, unsteady - 1);
+  const bool counts = !now.begins && !now.bridged && !repeats && !gap && unsteady == 0 && is_steady(now);
   gap = now.bridged || repeats;
   acceleration_ = (now.v - last_v) / now.elapsed;
   last_q = now.q;

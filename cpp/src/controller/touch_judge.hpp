@@ -20,6 +20,7 @@ struct TouchMemory {
   double lasted = 0.0;                // Time of samples in a row beyond what is allowed [s].
   int lasts = 0;                      // Number of these samples.
   bool gap = true;                    // The last sample does not count.
+  int unsteady = 0;                   // Number of samples that still do not count, after one that came late.
   bool touched = false;               // Until `release`.
   Eigen::Index joint = 0;             // Joint that felt the touch.
   double torque = 0.0,
@@ -41,12 +42,13 @@ class TouchJudge : private TouchMemory {
   /// `judges`: whether the arm is moved by torque, and not made to be pushed.
   TouchJudge(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool judges);
 
-  /// A sample of the arm, `elapsed` [s] after the one before. `begins`: nothing before it counts; `bridged`: it is no measurement.
+  /// A sample of the arm, `elapsed` [s] after the one before. `begins`: nothing before it counts; `bridged`: it is no measurement;
+  /// `late`: it did not come when it was expected, so that the torque was held for another time.
   struct Sample {
     const Eigen::VectorXd& q;
     const Eigen::VectorXd& v;
     double elapsed;
-    bool begins = false, bridged = false;
+    bool begins = false, bridged = false, late = false;
   };
   /// What acted on the arm in the period before: the torque sent, the mass matrix with rotors, the bias of the model.
   struct Acted {

@@ -35,8 +35,8 @@ struct Feeling {
     torque = mass * a - d;
     return feel();
   }
-  bool feel(bool bridged = false) {
-    const bool touches = judge.judge({q, v, settings.period, begins, bridged}, {torque, mass, bias});
+  bool feel(bool bridged = false, bool late = false) {
+    const bool touches = judge.judge({q, v, settings.period, begins, bridged, late}, {torque, mass, bias});
     begins = false;
     return touches;
   }
@@ -186,6 +186,14 @@ BOOST_AUTO_TEST_CASE(faults_of_measurement_are_no_touch) {
     BOOST_TEST(!bridged.feel(true));
   }
   BOOST_TEST(bridged.rest_until_touch(rest) == -1);
+
+  Feeling late;  // a loop that is held up now and then leads the arm back by itself
+  late.begin();
+  for (int k = 0; k < 200; ++k) {
+    late.torque[0] = k % 20 < 5 ? 80.0 : 0.0;
+    BOOST_TEST(!late.feel(false, k % 20 == 0));
+  }
+  BOOST_TEST(late.rest_until_touch(rest) == -1);
 
   Feeling unknown;  // neither poisons what follows
   unknown.begin();
