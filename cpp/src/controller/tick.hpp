@@ -33,9 +33,9 @@ struct Tick {
   double torque_period() const noexcept { return std::min(elapsed, told); }
 
   /// Share of its speed for an arm whose torques change at a limited rate: gravity and inertia ask for less of it in slower motions, and
-  /// a loop below a quarter of the told rate leaves them too little.
+  /// a loop below half of the told rate leaves them too little.
   double speed_share() const noexcept {
-    constexpr double usual_share = 0.25;
+    constexpr double usual_share = 0.5;
     const double share = told / (period * usual_share);
     return share < 1.0 ? share * std::sqrt(share) : 1.0;
   }
