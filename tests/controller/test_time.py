@@ -131,8 +131,8 @@ def drive_by_the_clock(arm: ss.Arm, output: str, period: float, seconds: float =
 
 
 def moves_at(output: str, rate: int) -> float:
-    """Torques that change by an eighth of their rate are for a slower arm."""
-    return 0.1 if output == "torque" and rate < 250 else 0.4
+    """Torques that change by a quarter or an eighth of their rate are for a slower arm: one at full speed ran away."""
+    return {125: 0.1, 250: 0.3}.get(rate, 0.4) if output == "torque" else 0.4
 
 
 @pytest.mark.parametrize("rate", [125, 250, 500])
@@ -176,7 +176,7 @@ def test_paths_of_the_planner_leave_slow_torques_their_time(arm: ss.Arm, seed: i
         command = controller.step(q, v, time=0.008 * k)
         motion.q.append(q), motion.v.append(v), motion.torque.append(command.torque)
         plant.hold(command, 0.008)
-    motion.check(arm, "torque", TOLD, moves=0.3)
+    motion.check(arm, "torque", TOLD, moves=0.2)
 
 
 def test_a_rate_that_falls_while_the_arm_moves(arm: ss.Arm) -> None:

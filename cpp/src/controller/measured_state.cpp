@@ -22,6 +22,7 @@ constexpr double moved_for = 1.0;      // time for which `explain` says that the
 constexpr double velocity_leap = 0.1;  // share of the velocity limit by which no motor changes a velocity in a period [-]
 constexpr double least_velocity_leap = 0.1;  // the same of slow joints: velocities are noisy [rad/s]
 constexpr double rest_jitter = 0.1;          // velocity of an arm that may be measured at the same place again [rad/s]
+constexpr double same_change = 0.05;         // change of velocity that the same numbers again do not show [rad/s]
 constexpr double still = 0.005;              // distance between the samples of an arm that rests [rad]
 constexpr double rest_to_begin_anew = 0.5;   // time of rest away from the command [s]
 
@@ -33,7 +34,7 @@ MeasurementMemory::MeasurementMemory(Eigen::Index nv)
       last_q(Eigen::VectorXd::Constant(nv, std::numeric_limits<double>::quiet_NaN())),
       last_v(q),
       turns(q),
-      sample{q, q, q, q, q},
+      sample{q, q, q, q, q, q},
       predicted_q(q),
       predicted_v(q) {
   away.anchor = q;
@@ -166,8 +167,14 @@ double MeasuredState::error_scale(Eigen::Index j) const noexcept { return joints
 void MeasuredState::check_repetition(const Tick& tick) noexcept {
   // The same numbers again although the arm moves: they are old.
   bool same = sample.q == sample.last_q && sample.v == sample.last_v, moves = false;
+  if (!same || sample.v.isZero(0.0)) {  // an arm that is held does not move, whatever is commanded
+    sample.change.setZero();
+  } else {
+    sample.change += predicted_v - last_v;
+  }
   for (Eigen::Index j = 0; j < q.size(); ++j) {
-    moves = moves || std::abs(sample.v[j]) > error_scale(j) * rest_jitter;
+    const double scale = error_scale(j);
+    moves = moves || std::abs(sample.v[j]) > scale * rest_jitter || std::abs(sample.change[j]) > scale * same_change;
   }
   same = same && moves;
   sample.repeated = same ? sample.repeated + 1 : 0;

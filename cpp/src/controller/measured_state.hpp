@@ -27,6 +27,7 @@ struct MeasurementMemory {
   struct Sample {
     Eigen::VectorXd q, v, last_q, last_v;  // as measured
     Eigen::VectorXd turns;                 // Turns of the last sample that was taken.
+    Eigen::VectorXd change;                // by which velocities should have changed since samples are the same [rad/s | m/s]
     int disagreeing = 0;                   // samples in a row that disagree with the reference
     int repeated = 0;                      // samples in a row that are the same although the arm moves
     int leaps = 0;                         // samples in a row whose velocity leaps and whose position does not

@@ -36,8 +36,7 @@ struct Tick {
   /// a loop below half of the told rate leaves them too little.
   double speed_share() const noexcept {
     constexpr double usual_share = 0.5;
-    const double share = told / (period * usual_share);
-    return share < 1.0 ? share * std::sqrt(share) : 1.0;
+    return std::min(1.0, told / (period * usual_share));
   }
   /// Time by which a reference whose velocities are held for the period leads an arm that moves on in periods of the settings.
   double lead() const noexcept { return 0.5 * (period - told); }

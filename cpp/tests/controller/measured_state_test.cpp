@@ -149,6 +149,26 @@ BOOST_AUTO_TEST_CASE(the_same_sample_again_of_an_arm_that_moves_is_an_old_one) {
   BOOST_TEST(!still.state.bridges_sample());
 }
 
+BOOST_AUTO_TEST_CASE(the_same_sample_again_of_a_slow_arm_that_is_accelerated_is_an_old_one_too) {
+  Measuring m(Output::torque);
+  const Eigen::Vector2d slow(0.05, 0.0), accelerated(20.0, 0.0);
+  m.step(here, slow, here);
+  m.step(here + measured_period * slow, slow, here + measured_period * slow);
+  const Eigen::Vector2d frozen = here + measured_period * slow;
+  int first = -1;
+  for (int k = 0; k < 30; ++k) {
+    m.step(frozen, slow, frozen, accelerated);
+    first = first < 0 && m.state.bridges_sample() ? k : first;
+  }
+  BOOST_TEST(first == 2);                   // the third, after which 0.06 rad/s are missing
+  BOOST_TEST(m.state.velocity()[0] > 0.5);  // 27 ms of 20 rad/s²
+  Measuring held(Output::torque);           // an arm that is held is measured at rest again and again
+  for (int k = 0; k < 30; ++k) {
+    held.step(here, rests, here, accelerated);
+    BOOST_TEST(!held.state.bridges_sample());
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_velocity_that_leaps_alone_is_replaced_until_it_has_stayed_for_five_samples) {
   Measuring m(Output::acceleration);
   m.step(here, rests, here);

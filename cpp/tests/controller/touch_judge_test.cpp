@@ -187,13 +187,13 @@ BOOST_AUTO_TEST_CASE(faults_of_measurement_are_no_touch) {
   }
   BOOST_TEST(bridged.rest_until_touch(rest) == -1);
 
-  Feeling late;  // a loop that is held up now and then leads the arm back by itself
-  late.begin();
+  Feeling held_up;  // a loop that is held up now and then leads the arm back by itself
+  held_up.begin();
   for (int k = 0; k < 200; ++k) {
-    late.torque[0] = k % 20 < 5 ? 80.0 : 0.0;
-    BOOST_TEST(!late.feel(false, k % 20 == 0));
+    held_up.torque[0] = k % 20 < 5 ? 80.0 : 0.0;
+    BOOST_TEST(!held_up.feel(false, k % 20 == 0));
   }
-  BOOST_TEST(late.rest_until_touch(rest) == -1);
+  BOOST_TEST(held_up.rest_until_touch(rest) == -1);
 
   Feeling unknown;  // neither poisons what follows
   unknown.begin();
