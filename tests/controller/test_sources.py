@@ -206,3 +206,20 @@ def test_old_points_with_new_times_are_no_news(planar: ss.Arm) -> None:
         q, v = motion.last_q, motion.last_v
     assert controller.command.status == ss.SafetyStatus.stale
     assert "old data with new times" in controller.explain()
+
+
+def test_untold_times_of_sets_are_those_of_a_simulation_that_is_faster_than_real_time(planar: ss.Arm) -> None:
+    controller = ss.Controller(planar, ss.ControllerSettings(output="acceleration", planner=None))
+    controller.set_goal(START)
+    q, v = START, np.zeros(3)
+    for k in range(
+        300
+    ):  # no step takes as long as a period; a ball of 0.3 m/s, 30 times a second of the simulation
+        if k % 33 == 0:
+            controller.set_obstacles(ss.Obstacles([[3.0, 0.3e-3 * k, 0.0]], radii=0.05), source="tracker")
+        command = controller.step(q, v)
+        v = v + PERIOD * command.acceleration
+        q = q + PERIOD * v
+    if controller.command.late_steps == 0:  # else the machine was too slow to be a simulation
+        np.testing.assert_allclose(controller.obstacles.velocities, [[0.0, 0.3, 0.0]], atol=0.03)
+    assert controller.time > 0.0

@@ -1,7 +1,6 @@
 // The public face, and what is set from any thread.
 #include "sidestep/controller/controller.hpp"
 
-#include <chrono>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -70,10 +69,7 @@ void Controller::clear_goal() {
   tell([](Impl& impl) { impl.set_goal(std::nullopt); });
 }
 
-double Controller::now() const noexcept {
-  return settings_.synchronous ? time_.load(std::memory_order_relaxed)
-                               : std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double Controller::now() const noexcept { return time_.load(std::memory_order_relaxed); }
 template <class Change>
 void Controller::change_sources(const Obstacles& said, Change&& change) {
   const std::lock_guard lock(setters_);
@@ -119,7 +115,8 @@ const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const E
   }
   take_over();
   const Command& command = impl_->step(q, v, {mass_matrix, bias}, time);
-  time_.store(impl_->time(), std::memory_order_relaxed);
+  time_.store(impl_->tick().time, std::memory_order_relaxed);
+  offset_.store(impl_->tick().offset, std::memory_order_relaxed);
   if (recorder != nullptr) {
     recorder->end_step(*impl_);
   }

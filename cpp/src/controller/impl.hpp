@@ -66,7 +66,7 @@ class Controller::Impl {
   Eigen::VectorXd target() const;
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
   const Sources& sources() const noexcept { return sources_; }
-  double time() const noexcept { return state_.time; }
+  const Tick& tick() const noexcept { return clock_.tick(); }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
   StepStatus attraction_status() const noexcept { return state_.attraction; }
   TorqueStatus program_status() const noexcept { return state_.program; }

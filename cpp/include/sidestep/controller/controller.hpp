@@ -125,7 +125,7 @@ class Controller {
   /// What is believed of each source. Only for the thread of `step`; allocates.
   std::vector<SourceState> sources() const;
   /// Clock on which obstacles are captured: time of the last step [s]; from any thread.
-  double time() const noexcept { return time_.load(std::memory_order_relaxed); }
+  double time() const noexcept { return now() - offset_.load(std::memory_order_relaxed); }
 
   // Each of these prepares another body while steps go on, in a few tenths of a second, and returns. The next step uses the new
   // body. The planner plans again, from where the arm is.
@@ -220,7 +220,7 @@ class Controller {
   void tell_locked(Action&& action);  // with setters_ locked
   template <class Change>
   void change_sources(const Obstacles& said, Change&& change);
-  double now() const noexcept;
+  double now() const noexcept;  // the controller's own time of the last step [s]
   void take_over() noexcept;
   struct Held {
     Attachment object;
@@ -257,7 +257,7 @@ class Controller {
   std::unique_ptr<Recorder> recorder_;
   std::atomic<Recorder*> records_{nullptr};  // Used by the thread of `step`; null once the recording has ended.
   std::atomic<bool> in_use_{false};
-  std::atomic<double> time_{0.0};
+  std::atomic<double> time_{0.0}, offset_{0.0};  // own time of the last step, and what it is more than the caller's [s]
 };
 
 }  // namespace sidestep
