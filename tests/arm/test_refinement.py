@@ -10,7 +10,7 @@ from sidestep.arm import Refinement
 from sidestep.arm.tight_places import tight_links
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_refine import Ellipsoids
-from sidestep.obstacles import Obstacles, pose_at
+from sidestep.obstacles import pose_at
 from support.two_links import BOX, PLANAR, beside
 
 
@@ -128,7 +128,7 @@ def test_finer_covers_are_not_made_where_they_cannot_help():
     controller.step(np.zeros(2), np.zeros(2))
     assert controller.goal_obstruction is not None  # the mesh is in the ball
     assert tight_links(controller, arm) == {}
-    controller.set_obstacles(Obstacles.none())
+    controller.remove_obstacles()
     assert controller.goal_obstruction is None
     assert tight_links(controller, arm) == {}
 

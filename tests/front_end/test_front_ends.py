@@ -72,7 +72,7 @@ def controller(output: str) -> ss.Controller:
         ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True, seed=SEED, output=output, period=PERIOD)
     )
     made.set_goal(GOAL)
-    made.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES))
+    made.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES), valid_for=np.inf)
     return made
 
 
@@ -250,7 +250,7 @@ def torques_of_snippet() -> Array:
     variables["settings"].synchronous = True
     one = ss.Controller(variables["arm"], variables["settings"])
     one.set_goal(variables["goal"])
-    one.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES))
+    one.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES), valid_for=np.inf)
     return torques_of(one)
 
 
