@@ -1,5 +1,6 @@
 // One motion, as C++ makes it: `motion ARM.arm acceleration|torque STEPS PERIOD SEED` reads numbers: start and goal (nv),
 // then centre, radius and velocity of each ball. It prints acceleration and torque (nv, nv) of every step in hexadecimal.
+#include <limits>
 #include <cstdio>
 #include <iostream>
 #include <sidestep/sidestep.hpp>
@@ -25,7 +26,8 @@ int main(int, char** argv) {
       numbers.data() + 2 * nv, 7, (static_cast<Eigen::Index>(numbers.size()) - 2 * nv) / 7);
   Eigen::VectorXd q = states.head(nv), v = Eigen::VectorXd::Zero(nv);
   controller.set_goal(Eigen::VectorXd(states.tail(nv)));
-  controller.set_obstacles({balls.topRows<3>(), balls.row(3).transpose(), balls.bottomRows<3>()});
+  controller.set_obstacles({balls.topRows<3>(), balls.row(3).transpose(), balls.bottomRows<3>()},
+                           {.valid_for = std::numeric_limits<double>::infinity()});
 
   for (int k = 0; k < std::stoi(argv[3]); ++k) {
     const sidestep::Command& command = controller.step(q, v);
