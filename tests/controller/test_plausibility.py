@@ -242,3 +242,14 @@ def test_what_looks_like_degrees() -> None:
     assert looks == [True, True, True, True]
     plain = (3.0 * np.pi, 4.0 * np.pi, 20.0 * np.pi, 0.5, 1081.0, np.inf, np.nan)
     assert not any(looks_like_degrees(angle) for angle in plain)
+
+
+def test_a_state_in_another_order_of_joints_moves_nothing_and_says_so(fr3: ss.Arm) -> None:
+    c = controller(fr3)
+    c.set_goal(fr3.neutral)
+    swapped = fr3.neutral[[0, 1, 2, 5, 4, 3, 6]]
+    command = c.step(swapped, np.zeros(7))
+    assert command.status == ss.SafetyStatus.stopping
+    np.testing.assert_array_equal(command.acceleration, np.zeros(7))
+    assert "joint 'fr3_joint4' is measured at" in c.explain()
+    assert c.explain().endswith("are the joints in another order? It could be that of 'fr3_joint6'")

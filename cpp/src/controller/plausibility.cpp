@@ -253,7 +253,7 @@ std::string Plausibility::hint(const Robot& robot, ConstVectorRef q) {
 Plausibility::Impossible Plausibility::impossible(ConstVectorRef q, ConstVectorRef v) const noexcept {
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     if (q[j] < limits_.lower[j] - beyond || q[j] > limits_.upper[j] + beyond) {
-      return {static_cast<int>(j), false, q[j]};
+      return {static_cast<int>(j), false, q[j], exchanged(q, j)};
     }
   }
   for (Eigen::Index j = 0; j < v.size(); ++j) {
@@ -262,6 +262,16 @@ Plausibility::Impossible Plausibility::impossible(ConstVectorRef q, ConstVectorR
     }
   }
   return {};
+}
+
+int Plausibility::exchanged(ConstVectorRef q, Eigen::Index j) const noexcept {
+  const auto fits = [&](double value, Eigen::Index k) { return value >= limits_.lower[k] && value <= limits_.upper[k]; };
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    if (fits(q[j], k) && fits(q[k], j)) {
+      return static_cast<int>(k);
+    }
+  }
+  return -1;
 }
 
 std::string Plausibility::describe(const Impossible& what) const {
@@ -275,7 +285,10 @@ std::string Plausibility::describe(const Impossible& what) const {
   }
   const bool fits = meant >= limits_.lower[j] - JointLimits::rounding && meant <= limits_.upper[j] + JointLimits::rounding;
   return "joint '" + name(j) + "' is measured at " + number(what.value) + unit(j) + ", its limits are " +
-         number(limits_.lower[j]) + " and " + number(limits_.upper[j]) + unit(j) + (fits ? guess : "");
+         number(limits_.lower[j]) + " and " + number(limits_.upper[j]) + unit(j) +
+         (fits              ? guess
+          : what.other >= 0 ? "; are the joints in another order? It could be that of '" + name(what.other) + "'"
+                            : "");
 }
 
 }  // namespace sidestep

@@ -52,12 +52,15 @@ class Plausibility {
     int joint = -1;         ///< -1: nothing
     bool velocity = false;  ///< its velocity is, else its position
     double value = 0.0;
+    int other = -1;  ///< joint whose position it could be, and the other way round; -1: none
   };
   /// A position beyond its limits by more than 1 rad or m, or a velocity over ten times its limit. No allocation.
   Impossible impossible(ConstVectorRef q, ConstVectorRef v) const noexcept;
   std::string describe(const Impossible& what) const;
 
  private:
+  /// A joint whose position could be that of joint j, and that of j its own; -1: none.
+  int exchanged(ConstVectorRef q, Eigen::Index j) const noexcept;
   struct Shoulder {
     Eigen::Vector3d at;
     double reach;
