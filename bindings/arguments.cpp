@@ -1,5 +1,6 @@
 #include "arguments.hpp"
 
+#include <limits>
 #include <nanobind/stl/string.h>
 
 #include <cmath>
@@ -234,6 +235,14 @@ Eigen::MatrixXd as_rows(nb::handle value, const char* name, Eigen::Index nv) {
   }
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
       array.data(), static_cast<Eigen::Index>(array.shape(0)), nv);
+}
+
+double as_seconds(nb::handle value, const char* name) {
+  double number = std::numeric_limits<double>::quiet_NaN();
+  if (!value.is_none() && !nb::try_cast<double>(value, number)) {
+    raise_type(value, name, "a number of seconds, or None");
+  }
+  return number;
 }
 
 }  // namespace sidestep::python

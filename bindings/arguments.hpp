@@ -89,6 +89,9 @@ void check_fitted_to(const Robot& robot, const Body& body);
 /// Obstacles as they are; a shape, or a list of shapes and obstacles, by `sidestep.obstacles.obstacles_from_shapes`.
 Obstacles as_obstacles(nb::handle value);
 
+/// A number of seconds, or None: NaN.
+double as_seconds(nb::handle value, const char* name);
+
 /// A pose (4, 4), or a position (3,) where `position_only`; warns of a rotation that was rounded, and takes the nearest.
 Eigen::Isometry3d as_pose(nb::handle value, bool position_only = false);
 

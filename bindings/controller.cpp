@@ -268,15 +268,6 @@ void warn_of_order(const Controller& controller) {
   }
 }
 
-/// The time that a step is told [s]; NaN: none.
-double as_time(nb::handle time) {
-  double number = std::numeric_limits<double>::quiet_NaN();
-  if (!time.is_none() && !nb::try_cast<double>(time, number)) {
-    raise_type(time, "time", "a number of seconds, or None");
-  }
-  return number;
-}
-
 /// What the thread of `step` alone may read, refused while another one has the controller.
 template <class Get>
 auto of_last_step(Get get) {
@@ -429,7 +420,7 @@ void bind_controller(nb::module_& m) {
             if (mass_matrix.is_none() != bias.is_none()) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
             }
-            const double now = as_time(time);
+            const double now = as_seconds(time, "time");
             const Controller::ClaimedController use(self);
             Command command = mass_matrix.is_none() ? self.step(position, velocity, now)
                                                     : self.step(position, velocity, as_matrix(mass_matrix, "mass_matrix", nv, nv),

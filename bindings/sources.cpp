@@ -7,27 +7,22 @@
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/controller/controller.hpp"
-#include "sidestep/attractor/goal.hpp"
 
 namespace sidestep::python {
 namespace {
 
-double seconds(nb::handle value, const char* name) {
-  if (value.is_none()) {
-    return SourceOptions::untold;
-  }
-  double number = 0.0;
-  if (!nb::try_cast(value, number)) {
-    raise_type(value, name, "a number of seconds or None");
-  }
-  if (std::isnan(number)) {
+/// Seconds or None, which is NaN; NaN itself is refused: in a set it is a fault.
+double told_seconds(nb::handle value, const char* name) {
+  const double number = as_seconds(value, name);
+  if (std::isnan(number) && !value.is_none()) {
     throw nb::value_error((std::string(name) + " is nan, must be a number of seconds, or None where it is not known").c_str());
   }
   return number;
 }
 
 SourceOptions options(nb::handle source, nb::handle time, nb::handle valid_for) {
-  return {as_text(source, "source", "the name of a source, such as 'camera'"), seconds(time, "time"), seconds(valid_for, "valid_for")};
+  return {as_text(source, "source", "the name of a source, such as 'camera'"), told_seconds(time, "time"),
+          told_seconds(valid_for, "valid_for")};
 }
 
 void warn_of_obstacles(const Controller& controller) {
@@ -89,11 +84,7 @@ void bind_sources(nb::module_& m) {
       .def(
           "move_obstacle",
           [](Controller& self, nb::handle name, nb::handle pose, nb::handle source, nb::handle time, nb::handle valid_for) {
-            const Eigen::Isometry3d to = as_pose(pose);
-            if (rotation_defect(to.linear()) >= rotation_tolerance || to.linear().determinant() < 0.0) {
-              throw nb::value_error("pose: its upper left 3 x 3 is not a rotation");
-            }
-            self.move_obstacle(as_text(name, "name", "the name of an obstacle"), to, options(source, time, valid_for));
+            self.move_obstacle(as_text(name, "name", "the name of an obstacle"), as_pose(pose), options(source, time, valid_for));
           },
           nb::arg("name"), nb::arg("pose"), nb::arg("source") = SourceOptions::scene, nb::kw_only(), nb::arg("time") = nb::none(),
           nb::arg("valid_for") = nb::none(),

@@ -72,18 +72,7 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
   if (settings.posture_stiffness > 0.0 && settings.rest.size() == 0) {
     throw std::invalid_argument("pose goal: a posture stiffness needs a rest configuration");
   }
-  const Eigen::Matrix3d R = pose.linear();
-  if (R.allFinite() && R.determinant() < 0.0) {
-    throw std::invalid_argument("pose goal: the upper left 3 × 3 block of the pose mirrors, so it is not a rotation");
-  }
-  if (const double off = rotation_defect(R); R.allFinite() && !(off < rotation_tolerance)) {
-    std::ostringstream text;
-    text.precision(2);
-    text << "pose goal: the upper left 3 × 3 block R of the pose is not a rotation: an entry of R^T R - 1 is " << off
-         << ", allowed are " << rotation_tolerance << " and, of what was rounded, " << rotation_rounding
-         << " by way of nearest_rotation(R); a quaternion must have norm 1";
-    throw std::invalid_argument(text.str());
-  }
+  check_rotation(pose.linear(), "pose goal");
   // Lengths from the tip inwards; a prismatic joint adds its travel, a shoulder's own placement does not count.
   made_for_.reach = made_for_.frame.X_JF.translation().norm();
   for (int j = made_for_.frame.joint; j >= 0;) {
@@ -290,17 +279,6 @@ void GoalPotential::add(const PoseGoal& goal, bool posture, const KinematicState
     const Vector6d seen = factor.solve(goal.twist);
     velocity += jacobian_transposed_.lazyProduct(seen);
   }
-}
-
-double rotation_defect(const Eigen::Matrix3d& matrix) noexcept {
-  return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-}
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  signs[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) noexcept {

@@ -11,7 +11,7 @@
 
 namespace sidestep {
 
-void Controller::Impl::put(World world, std::string question) {
+void Controller::Impl::put(std::shared_ptr<const World> world, std::string question) {
   board_.put(std::move(world), std::move(question), [this](const Obstacles& shared) { share_with_planner(shared); });
 }
 
@@ -75,7 +75,7 @@ void Controller::change_sources(const Obstacles& said, Change&& change) {
   const std::lock_guard lock(setters_);
   change(*registry_);
   const std::string question = newest().model.plausible.question(said);
-  const World world = registry_->world();
+  const auto world = std::make_shared<const World>(registry_->world());
   tell_locked([&](Impl& impl) { impl.put(world, question); });
 }
 void Controller::set_obstacles(Obstacles obstacles, const SourceOptions& options) {

@@ -79,7 +79,7 @@ std::string Controller::Impl::explain_motion() const {
   if (command_.status == SafetyStatus::clearance_lost && command_.coordinate >= 0) {
     text += explain_overlap(command_, model.system->labels()[static_cast<std::size_t>(command_.coordinate)], obstacles());
   }
-  text += measured_.explain(reference_.next_q, state_.time);
+  text += measured_.explain(reference_.next_q, clock_.tick().time);
   if (!measured_.agrees_with_reference()) {
     return text;
   }

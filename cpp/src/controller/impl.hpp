@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -43,7 +44,7 @@ class Controller::Impl {
   void set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free);
   void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour);
   /// All obstacles; `question`: what is hard to believe in what was set.
-  void put(World world, std::string question = {});
+  void put(std::shared_ptr<const World> world, std::string question = {});
   /// `question`: of a trajectory; that of other requests is found here.
   void put(Request request, std::string question = {});
   /// Obstacles that were set, for the planner's thread.
@@ -103,7 +104,7 @@ class Controller::Impl {
     explicit StepState(Eigen::Index nv);
 
     std::uint64_t steps = 0;
-    double time = 0.0, next_look = 0.0;                           // [s]
+    double next_look = 0.0;                                       // [s]
     bool apart = false;                                           // the arm is not exactly where the reference is
     const Goal* followed = nullptr;                               // Goal by which the reference is led.
     StepStatus attraction = StepStatus::invalid_state;            // how the attractor ended

@@ -303,7 +303,8 @@ void Replay::give_world(std::uint64_t number) {
     oldest = std::min(oldest, record.number);
   }
   world.obstacles = join(world.sources);
-  controller_.tell([&](Impl& impl) { impl.put(world); });
+  const auto given = std::make_shared<const World>(std::move(world));
+  controller_.tell([&](Impl& impl) { impl.put(given); });
   worlds_.erase(worlds_.begin(), found);
   obstacles_.erase(obstacles_.begin(), obstacles_.lower_bound(oldest));
 }

@@ -20,11 +20,11 @@ void RequestBoard::put(Request request, std::string question) {
   requests_.put({++request_count_, std::move(request)});
 }
 
-void RequestBoard::show_world(std::shared_ptr<const World> copy, std::string question, World world) {
-  shown_world_ = std::move(copy);
+void RequestBoard::show_world(std::shared_ptr<const World> world, std::string question, World moving) {
+  shown_world_ = std::move(world);
   questions_.order_is_newer = questions_.order_is_newer && question.empty();
   questions_.obstacles = std::move(question);
-  worlds_.put(std::move(world));
+  worlds_.put(std::move(moving));
 }
 
 RequestBoard::Newest RequestBoard::newest() const {

@@ -27,11 +27,11 @@ class RequestBoard {
   void put(Request request, std::string question);
   /// Hands all obstacles over to the step. `share` gets a copy before any others can be put: the planner's.
   template <class Share>
-  void put(World world, std::string question, Share&& share) {
-    auto copy = std::make_shared<const World>(world);
+  void put(std::shared_ptr<const World> world, std::string question, Share&& share) {
+    World moving = *world;
     const std::lock_guard lock(mutex_);  // also of the planner's obstacles: the worker must not bring back older ones
-    share(copy->obstacles);
-    show_world(std::move(copy), std::move(question), std::move(world));
+    share(world->obstacles);
+    show_world(std::move(world), std::move(question), std::move(moving));
   }
   /// Calls share() unless newer obstacles than these have been put: who gets those knows them already.
   template <class Share>
@@ -100,7 +100,7 @@ class RequestBoard {
  private:
   // With the mutex locked.
   void show(const Newest& newest);
-  void show_world(std::shared_ptr<const World> copy, std::string question, World world);
+  void show_world(std::shared_ptr<const World> world, std::string question, World moving);
   void note_fault(const char* what) noexcept;
 
   TripleBuffer<NumberedRequest> requests_;

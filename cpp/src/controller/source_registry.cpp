@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sidestep/math/rotation.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -247,6 +249,7 @@ void SourceRegistry::add(const Obstacles& obstacles, const std::string& source) 
 
 void SourceRegistry::move(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options, double now) {
   check(options);
+  check_rotation(pose.linear(), "move_obstacle");
   Entry& entry = at(options.source);
   Groups groups;
   groups.add(entry.given);

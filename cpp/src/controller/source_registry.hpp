@@ -34,7 +34,6 @@ class SourceRegistry {
 
   /// All sources, as a step takes them.
   World world() const;
-  std::uint64_t number() const noexcept { return number_; }
 
  private:
   struct Entry {

@@ -30,28 +30,28 @@ Sources::Sources(TripleBuffer<World>& handed_over, const ClearanceQuery& body, c
       buffer_(handed_over),
       closing_(robot, ellipsoids, body.items().obstacles(), settings.safety.margin) {}
 
-bool Sources::update(const Eigen::VectorXd& q, const Moment& now) noexcept {
-  time_ = now.time;
+bool Sources::update(const Eigen::VectorXd& q, const Tick& tick) noexcept {
+  time_ = tick.time;
   if (buffer_.is_fresh()) {
-    advance(buffer_.current(), now);
+    advance(buffer_.current(), tick);
     closing_.leave(q, buffer_.current().obstacles);
     buffer_.update();  // one that comes after the question above is taken by the next step
   }
   bool others = buffer_.current().number != number_;
   if (others) {
     number_ = buffer_.current().number;
-    adopt(now);
-    closing_.take(buffer_.current().obstacles, now.time);
+    adopt(tick);
+    closing_.take(buffer_.current().obstacles, tick.time);
   } else {
-    advance(buffer_.current(), now);
+    advance(buffer_.current(), tick);
   }
-  others = believe_empty(now.time) || others;
+  others = believe_empty(tick.time) || others;
   judge_ages();
-  closing_.advance(now.time);
+  closing_.advance(tick.time);
   return others;
 }
 
-void Sources::adopt(const Moment& now) noexcept {
+void Sources::adopt(const Tick& tick) noexcept {
   World& world = buffer_.current();
   std::array<Known, most_sources> before = known_;
   const std::size_t num_before = std::exchange(num_known_, std::min(world.sources.size(), most_sources));
@@ -60,32 +60,32 @@ void Sources::adopt(const Moment& now) noexcept {
     const Known *const begin = before.data(), *const end = begin + num_before;
     const Known* const same = std::find_if(begin, end, [&](const Known& one) { return one.id == set.id; });
     Known& known = known_[k] = same == end ? Known{.id = set.id} : *same;
-    const auto captured = [&](double told) { return std::isnan(told) ? now.time : told + now.offset; };
+    const auto captured = [&](double told) { return std::isnan(told) ? tick.time : tick.own_time(told); };
     if (known.number != set.number) {
       known.number = set.number;
       known.uncertain = set.points->size() > 0 && set.points->uncertainty().maxCoeff() > 0.0;
-      known.time = std::min(captured(set.time), now.time);
-      known.ahead = std::max(0.0, captured(set.time) - now.time);
+      known.time = std::min(captured(set.time), tick.time);
+      known.ahead = std::max(0.0, captured(set.time) - tick.time);
     }
     if (known.heard_number != set.heard_number) {
       known.heard_number = set.heard_number;
-      known.heard = std::min(captured(set.heard), now.time);
+      known.heard = std::min(captured(set.heard), tick.time);
     }
     if (set.emptied && !known.emptied) {
-      known.emptied_at = now.time;
+      known.emptied_at = tick.time;
     }
     known.emptied = set.emptied;
     motion_.parts[k] = {};
   }
   for (std::size_t k = 0; k < num_known_; ++k) {
-    move(world, k, now.time - known_[k].time, world.sources[k].moves_for);
+    move(world, k, tick.time - known_[k].time, world.sources[k].moves_for);
   }
 }
 
-void Sources::advance(World& world, const Moment& now) noexcept {
+void Sources::advance(World& world, const Tick& tick) noexcept {
   for (std::size_t k = 0; k < std::min(num_known_, world.sources.size()); ++k) {
     if (!motion_.parts[k].frozen && !motion_.parts[k].hidden) {
-      move(world, k, now.elapsed, known_[k].time + world.sources[k].moves_for - (now.time - now.elapsed));
+      move(world, k, tick.elapsed, known_[k].time + world.sources[k].moves_for - (tick.time - tick.elapsed));
     }
   }
 }

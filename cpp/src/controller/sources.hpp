@@ -11,6 +11,7 @@
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/source.hpp"
 #include "sidestep/math/triple_buffer.hpp"
+#include "tick.hpp"
 #include "world.hpp"
 
 namespace sidestep {
@@ -25,14 +26,8 @@ class Sources {
   Sources(TripleBuffer<World>& handed_over, const ClearanceQuery& body, const Robot& robot, const Body& ellipsoids,
           const ControllerSettings& settings);
 
-  /// The moment of a step on the controller's clock [s].
-  struct Moment {
-    double time = 0.0;
-    double elapsed = 0.0;  // since the last step
-    double offset = 0.0;   // What is added to the caller's times.
-  };
   /// Moves the obstacles on, or takes those that were set since. True where they are others. The arm is at q.
-  bool update(const Eigen::VectorXd& q, const Moment& now) noexcept;
+  bool update(const Eigen::VectorXd& q, const Tick& tick) noexcept;
   /// Whether anything that moves is near the reference at q, or could be within a second.
   bool look_for_movers(const Eigen::VectorXd& q) noexcept;
   /// Goes on where the sources of another body of the same joints stopped: newer obstacles have not moved yet.
@@ -44,8 +39,6 @@ class Sources {
   std::uint64_t handed_over() const noexcept { return buffer_.current().number; }
   /// How they have moved since they were given.
   const WorldMotion& motion() const noexcept { return motion_; }
-  /// The source that is overdue for longest; -1: none.
-  int overdue() const noexcept { return overdue_; }
   /// A source is overdue, or none was ever set: nothing is known to be free.
   bool is_stale() const noexcept { return overdue_ >= 0 || number_ == 0; }
   bool has_movers() const noexcept { return has_movers_; }
@@ -65,9 +58,9 @@ class Sources {
     bool emptied = false, uncertain = false;
   };
 
-  void adopt(const Moment& now) noexcept;
+  void adopt(const Tick& tick) noexcept;
   /// Moves the points of all sources on by the time of a step.
-  void advance(World& world, const Moment& now) noexcept;
+  void advance(World& world, const Tick& tick) noexcept;
   /// Moves the points of source k on, for `most` [s] at most: beyond that they stand still.
   void move(World& world, std::size_t k, double duration, double most) noexcept;
   /// Believes what has been empty for long enough; true where there is such a source.
@@ -85,7 +78,7 @@ class Sources {
   std::array<Known, most_sources> known_;
   std::size_t num_known_ = 0;
   WorldMotion motion_;
-  int overdue_ = -1;
+  int overdue_ = -1;  // The source that is overdue for longest; -1: none.
   bool has_movers_ = false;
 };
 

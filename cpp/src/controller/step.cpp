@@ -12,7 +12,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const ControllerSettings& settings = model.settings;
   // Tick = clock(t)
   const Tick& tick = clock_.begin_step(told_time);
-  const double time = state_.time = tick.time;
+  const double time = tick.time;
   ++state_.steps;
   const bool known = measured_.take(q, v);
   take_over(tick);
@@ -80,7 +80,7 @@ bool Controller::Impl::begin_look(const Obstacles& obstacles, double time) noexc
 }
 
 void Controller::Impl::take_over(const Tick& tick) noexcept {
-  if (sources_.update(measured_.position(), {tick.time, tick.elapsed, tick.offset})) {
+  if (sources_.update(measured_.position(), tick)) {
     guard_.invalidate();
   }
   if (inputs_.update(tick)) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "../math/finite.hpp"
+#include "sidestep/math/rotation.hpp"
 
 namespace sidestep {
 Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities)
@@ -175,6 +176,9 @@ Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eig
   if (total != size()) {
     throw std::invalid_argument("obstacles: counts are of " + std::to_string(total) + " points, there are " +
                                 std::to_string(size()));
+  }
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    check_rotation(poses[k].linear(), "obstacles: '" + names[k] + "'");
   }
   Obstacles copy = *this;
   copy.names_ = std::make_shared<const Names>(Names{std::move(names), std::move(ends), std::move(poses)});

@@ -4,22 +4,24 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "sidestep/math/rotation.hpp"
+
 namespace sidestep {
 namespace {
 
 constexpr double on_a_line = 1e-6;     // Ratio of singular values below which points are on a line.
 constexpr double at_one_place = 1e-9;  // Radius of gyration below which points do not turn [m].
 
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(to * from.transpose(), Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d values = svd.singularValues();
+/// The rotation that takes points nearest to others, both about their means.
+Eigen::Matrix3d rotation_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+  const Eigen::Matrix3d correlation = to * from.transpose();
+  const Eigen::Vector3d values = Eigen::JacobiSVD<Eigen::Matrix3d>(correlation).singularValues();
   if (values[1] <= on_a_line * values[0]) {
     Eigen::Index farthest = 0;
     from.colwise().squaredNorm().maxCoeff(&farthest);
     return Eigen::Quaterniond::FromTwoVectors(from.col(farthest), to.col(farthest)).toRotationMatrix();
   }
-  const bool is_mirrored = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0;
-  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, is_mirrored ? -1.0 : 1.0).asDiagonal() * svd.matrixV().transpose();
+  return nearest_rotation(correlation);
 }
 
 }  // namespace
@@ -32,7 +34,7 @@ RigidMotion::RigidMotion(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& t
   rotation.setZero();
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   if (gyration > at_one_place && arms.squaredNorm() > 0.0) {
-    matrix = nearest_rotation(arms, turned);
+    matrix = rotation_between(arms, turned);
     const Eigen::AngleAxisd turn(matrix);
     rotation = turn.angle() * turn.axis();
   }

@@ -144,7 +144,7 @@ BOOST_AUTO_TEST_CASE(what_is_refused_says_what_is_allowed_and_changes_nothing) {
   Said said;
   said.registry.set(two_balls(), {}, 0.0);
   const auto& r = said.registry;
-  const std::uint64_t before = r.number();
+  const std::uint64_t before = r.world().number;
   SourceRegistry& all = said.registry;
   BOOST_TEST(error_of([&] { all.remove("lamp", "scene"); }) == "obstacles: source 'scene' has no 'lamp', it has 'cup', 'can'");
   BOOST_TEST(error_of([&] { all.remove("camera"); }) == "obstacles: there is no source 'camera', there are: 'scene'");
@@ -153,7 +153,7 @@ BOOST_AUTO_TEST_CASE(what_is_refused_says_what_is_allowed_and_changes_nothing) {
   BOOST_TEST(error_of([&] { all.set(one_ball(1.0), {.time = ever}, 0.0); }).find("infinite") != std::string::npos);
   BOOST_TEST(error_of([&] { all.add(two_balls(), "scene"); }).find("has 'cup' already") != std::string::npos);
   BOOST_TEST(error_of([&] { all.add(one_ball(1.0), "scene"); }).find("it has no name") != std::string::npos);
-  BOOST_TEST(r.number() == before);
+  BOOST_TEST(r.world().number == before);
   BOOST_TEST(r.world().obstacles.size() == 2);
   for (std::size_t k = 1; k < most_sources; ++k) {
     all.set(one_ball(1.0), {.source = "s" + std::to_string(k)}, 0.0);

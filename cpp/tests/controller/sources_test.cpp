@@ -16,7 +16,7 @@ struct Seeing {
       : model(test::stage_model(2, std::move(settings))),
         sources(buffer, model.body, model.arm.robot(), model.arm.body(), model.settings) {}
 
-  bool update(double elapsed = 0.001) { return sources.update(upright, {time += elapsed, elapsed, 0.0}); }
+  bool update(double elapsed = 0.001) { return sources.update(upright, Tick::regular(elapsed, time += elapsed)); }
   void put() { buffer.put(registry.world()); }
   /// Sets a source, as the thread that does.
   void set(Obstacles obstacles, SourceOptions options = {}) {
@@ -76,7 +76,7 @@ BOOST_AUTO_TEST_CASE(a_timeout_is_of_every_source_without_a_validity_of_its_own)
   BOOST_TEST(!seen.sources.is_stale());
   seen.update(0.001);
   BOOST_TEST(seen.sources.is_stale());
-  BOOST_TEST(seen.sources.overdue() == 0);
+  BOOST_TEST(seen.sources.states().at(0).is_overdue);
 }
 
 BOOST_AUTO_TEST_CASE(a_told_velocity_is_not_believed_for_longer_than_it_is_valid) {

@@ -42,11 +42,11 @@ inline Reference reference_at(const Eigen::VectorXd& q, const Eigen::VectorXd& v
 }
 
 /// A world of one source, "scene", which is valid for ever.
-inline World world_of(Obstacles obstacles, std::uint64_t number = 1) {
+inline std::shared_ptr<const World> world_of(Obstacles obstacles, std::uint64_t number = 1) {
   World world{number, obstacles, {}};
   world.sources.push_back({"scene", 1, number, SourceOptions::untold, SourceOptions::untold, number, for_ever.valid_for,
                            for_ever.valid_for, false, false, std::make_shared<const Obstacles>(obstacles)});
-  return world;
+  return std::make_shared<const World>(std::move(world));
 }
 
 }  // namespace sidestep::test

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "sidestep/math/rotation.hpp"
 #include "sidestep/attractor/gain.hpp"
 #include "sidestep/robot/kinematic_state.hpp"
 
@@ -147,16 +148,5 @@ struct GoalPotential {
 
 /// The rotation vector φ of a rotation matrix, |φ| <= π. Finite for every rotation; at a half turn one of ±φ.
 Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) noexcept;
-
-/// Largest entry of R^T R - 1 that a rotation R may have: matrices may have gone through single precision.
-inline constexpr double rotation_tolerance = 1e-6;
-/// Largest entry of R^T R - 1 that counts as rounding: a quaternion of three digits has up to 0.008.
-inline constexpr double rotation_rounding = 0.01;
-
-/// The largest entry of |R^T R - 1|: how far a matrix is from a rotation, or from one that mirrors.
-double rotation_defect(const Eigen::Matrix3d& matrix) noexcept;
-
-/// The rotation that is nearest to a matrix in the Frobenius norm (Higham 1986): of one whose digits were rounded.
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace sidestep
