@@ -22,5 +22,6 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_controller(m);
   sidestep::python::bind_sources(m);
   sidestep::python::bind_real_time(m);
+  sidestep::python::bind_perception(m);
   sidestep::python::bind_thesis(m);
 }

@@ -4,6 +4,7 @@
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
 #include "sidestep/controller/real_time.hpp"
+#include "sidestep/perception/perception.hpp"
 #include "sidestep/arm/arm.hpp"
 #include "sidestep/scene/obstacles.hpp"
 #include "sidestep/scene/velocity_estimate.hpp"

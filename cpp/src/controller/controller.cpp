@@ -36,7 +36,8 @@ Controller::Controller(Arm arm, ControllerSettings settings, bool workers)
       impl_(std::make_unique<Impl>(arm, settings_, command_, workers)),
       newest_(impl_.get()),
       whole_(std::move(arm)),
-      has_torque_(impl_->model.torque) {}
+      has_torque_(impl_->model.torque),
+      history_(whole_.num_coordinates()) {}
 
 Controller::~Controller() {
   delete next_.load();
@@ -93,6 +94,10 @@ void Controller::move_obstacle(const std::string& name, const Eigen::Isometry3d&
 void Controller::remove_obstacle(const std::string& name, const std::string& source) {
   change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.remove(name, source); });
 }
+std::shared_ptr<const Obstacles> Controller::obstacles_of(const std::string& source) const {
+  const std::lock_guard lock(setters_);
+  return registry_->said(source);
+}
 std::vector<SourceState> Controller::sources() const { return impl_->sources().states(); }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, double time) noexcept {
@@ -117,6 +122,9 @@ const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const E
   const Command& command = impl_->step(q, v, {mass_matrix, bias}, time);
   time_.store(impl_->tick().time, std::memory_order_relaxed);
   offset_.store(impl_->tick().offset, std::memory_order_relaxed);
+  if (impl_->measured().was_known()) {
+    history_.put(this->time(), impl_->measured().position());
+  }
   if (recorder != nullptr) {
     recorder->end_step(*impl_);
   }

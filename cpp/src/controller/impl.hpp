@@ -68,6 +68,7 @@ class Controller::Impl {
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
   const Sources& sources() const noexcept { return sources_; }
   const Tick& tick() const noexcept { return clock_.tick(); }
+  const MeasuredState& measured() const noexcept { return measured_; }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
   StepStatus attraction_status() const noexcept { return state_.attraction; }
   TorqueStatus program_status() const noexcept { return state_.program; }

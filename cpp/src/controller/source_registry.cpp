@@ -112,9 +112,16 @@ class Groups {
 
 SourceRegistry::SourceRegistry(const ControllerSettings& settings) : settings_(settings) {}
 
-SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept {
+const SourceRegistry::Entry* SourceRegistry::find(const std::string& source) const noexcept {
   const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.set.name == source; });
   return found == entries_.end() ? nullptr : &*found;
+}
+SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept {
+  return const_cast<Entry*>(std::as_const(*this).find(source));
+}
+std::shared_ptr<const Obstacles> SourceRegistry::said(const std::string& source) const noexcept {
+  const Entry* const entry = find(source);
+  return entry == nullptr ? nullptr : entry->set.points;
 }
 
 SourceRegistry::Entry& SourceRegistry::at(const std::string& source) {

@@ -18,6 +18,7 @@
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/single_stepper.hpp"
 #include "sidestep/controller/source.hpp"
+#include "sidestep/controller/state_history.hpp"
 #include "sidestep/attractor/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
 #include "sidestep/arm/arm.hpp"
@@ -122,8 +123,12 @@ class Controller {
   void move_obstacle(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options = {});
   /// Removes what has a name, at once.
   void remove_obstacle(const std::string& name, const std::string& source = SourceOptions::scene);
+  /// What a source said last, as it was given; null: nothing. From any thread.
+  std::shared_ptr<const Obstacles> obstacles_of(const std::string& source) const;
   /// What is believed of each source. Only for the thread of `step`; allocates.
   std::vector<SourceState> sources() const;
+  /// Where the arm was at its last steps, on the clock of `step`; from any thread.
+  const StateHistory& history() const noexcept { return history_; }
   /// Clock on which obstacles are captured: time of the last step [s]; from any thread.
   double time() const noexcept { return now() - offset_.load(std::memory_order_relaxed); }
 
@@ -257,6 +262,7 @@ class Controller {
   std::unique_ptr<Recorder> recorder_;
   std::atomic<Recorder*> records_{nullptr};  // Used by the thread of `step`; null once the recording has ended.
   std::atomic<bool> in_use_{false};
+  StateHistory history_;
   std::atomic<double> time_{0.0}, offset_{0.0};  // own time of the last step, and what it is more than the caller's [s]
 };
 

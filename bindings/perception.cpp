@@ -1,0 +1,363 @@
+// From depth cameras to obstacles.
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+
+#include "arguments.hpp"
+#include "module.hpp"
+#include "settings.hpp"
+#include "sidestep/perception/perception.hpp"
+
+namespace sidestep::python {
+namespace {
+
+template <class Number>
+using DepthPixels = nb::ndarray<Number, nb::c_contig, nb::device::cpu>;
+
+constexpr std::array<std::pair<const char*, DistortionModel>, 4> distortion_models{{
+    {"none", DistortionModel::none},
+    {"brown_conrady", DistortionModel::brown_conrady},
+    {"inverse_brown_conrady", DistortionModel::inverse_brown_conrady},
+    {"kannala_brandt", DistortionModel::kannala_brandt},
+}};
+
+DistortionModel as_distortion_model(const std::string& name) {
+  std::string known;
+  for (const auto& [its, model] : distortion_models) {
+    if (name == its) {
+      return model;
+    }
+    known += (known.empty() ? "'" : ", '") + std::string(its) + "'";
+  }
+  throw nb::value_error(("distortion_model is '" + name + "', allowed: " + known).c_str());
+}
+
+/// The intrinsics and the place of a camera, as Python gives them.
+void init_camera(DepthCamera* self, const std::string& name, int width, int height, double fx, double fy, double cx, double cy,
+                 nb::handle pose, const std::string& link, const std::string& model, nb::handle distortion, const DepthNoise& noise,
+                 double near, double far, double translation_error, double rotation_error, double clock_error) {
+  DepthCamera camera;
+  camera.name = name;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = fx;
+  camera.fy = fy;
+  camera.cx = cx;
+  camera.cy = cy;
+  camera.distortion_model = as_distortion_model(model);
+  if (!distortion.is_none()) {
+    const Eigen::VectorXd given = as_finite_vector(distortion, "distortion");
+    if (given.size() > 5) {
+      throw nb::value_error(("distortion has " + std::to_string(given.size()) + " coefficients, allowed: up to 5 (k1, k2, p1, p2, k3)").c_str());
+    }
+    std::copy(given.begin(), given.end(), camera.distortion.begin());
+  }
+  camera.link = link;
+  camera.pose = python::as_pose(pose);
+  camera.noise = noise;
+  camera.near = near;
+  camera.far = far;
+  camera.translation_error = translation_error;
+  camera.rotation_error = rotation_error;
+  camera.clock_error = clock_error;
+  camera.validate();
+  new (self) DepthCamera(camera);
+}
+
+/// An array of pixels that keeps what it shows alive.
+struct Pixels {
+  nb::object owner;
+  RawDepth raw;
+};
+
+Pixels as_depth(nb::handle given, const DepthCamera& camera, nb::handle unit) {
+  const nb::object array = nb::module_::import_("numpy").attr("ascontiguousarray")(given);
+  const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("name"));
+  Pixels pixels{array, {}};
+  const bool whole = kind == "uint16";
+  pixels.raw.unit = unit.is_none() ? (whole ? 0.001 : 1.0) : nb::cast<double>(unit);
+  if (!(pixels.raw.unit > 0.0 && pixels.raw.unit <= 1.0)) {
+    throw nb::value_error(("unit is " + in_short(pixels.raw.unit) + ", allowed: above 0 to 1 m").c_str());
+  }
+  if (!whole && kind != "float32" && kind != "float64") {
+    throw nb::type_error(("depth is of type " + kind + ", allowed: uint16, float32 or float64").c_str());
+  }
+  if (kind == "float64") {
+    pixels.owner = array.attr("astype")("float32");
+  }
+  const auto take = [&](const auto& image) {
+    if (image.ndim() != 2 || image.shape(0) != static_cast<std::size_t>(camera.height) ||
+        image.shape(1) != static_cast<std::size_t>(camera.width)) {
+      throw nb::value_error(("depth has shape " + std::string(nb::repr(pixels.owner.attr("shape")).c_str()) + ", allowed: (" +
+                             std::to_string(camera.height) + ", " + std::to_string(camera.width) + ") for camera '" + camera.name + "'")
+                                .c_str());
+    }
+    pixels.raw.pixels = std::span(image.data(), image.size());
+  };
+  if (whole) {
+    take(nb::cast<DepthPixels<const std::uint16_t>>(pixels.owner));
+  } else {
+    take(nb::cast<DepthPixels<const float>>(pixels.owner));
+  }
+  return pixels;
+}
+
+const DepthCamera& camera_of(const Perception& self, const std::string& name) {
+  for (const DepthCamera& camera : self.cameras()) {
+    if (camera.name == name) {
+      return camera;
+    }
+  }
+  self.pose(name);  // throws
+  return self.cameras().front();
+}
+
+double as_capture_time(nb::handle time) {
+  const double seconds = as_seconds(time, "time");
+  if (std::isnan(seconds)) {
+    throw nb::value_error("time is not told, must be when the image was captured [s], on the clock of step");
+  }
+  return seconds;
+}
+
+Eigen::VectorXd as_state(nb::handle q) { return q.is_none() ? Eigen::VectorXd() : as_finite_vector(q, "q"); }
+
+/// A numpy array (height, width) with a copy of the data.
+template <class Number>
+nb::object image_array(const std::vector<Number>& data, const DepthCamera& camera) {
+  const nb::object array = nb::module_::import_("numpy").attr("empty")(nb::make_tuple(camera.height, camera.width), std::is_same_v<Number, float> ? "float32" : "uint8");
+  using Raw = std::conditional_t<std::is_same_v<Number, float>, float, std::uint8_t>;
+  const auto view = nb::cast<DepthPixels<Raw>>(array);
+  std::memcpy(view.data(), data.data(), data.size() * sizeof(Number));
+  return array;
+}
+
+void bind_camera(nb::module_& m) {
+  nb::class_<DepthNoise>(m, "DepthNoise",
+                         "Noise of a depth camera: standard deviation sigma(z) = constant + quadratic z^2 of a depth z [m].\n\n"
+                         "For stereo quadratic = s/(f b), with the error s of a disparity [pixel], focal length f [pixel] and baseline b [m].")
+      .def(nb::init<>())
+      .def("__init__", [](DepthNoise* self, double constant, double quadratic) { new (self) DepthNoise{constant, quadratic}; },
+           nb::arg("constant") = DepthNoise{}.constant, nb::arg("quadratic") = DepthNoise{}.quadratic)
+      .def_ro("constant", &DepthNoise::constant, "[m]")
+      .def_ro("quadratic", &DepthNoise::quadratic, "[1/m]")
+      .def("sigma", &DepthNoise::sigma, nb::arg("z"), "Standard deviation of a depth z [m].")
+      .def("__repr__", [](const DepthNoise& n) { return "DepthNoise(constant=" + in_short(n.constant) + ", quadratic=" + in_short(n.quadratic) + ")"; });
+
+  const DepthCamera defaults;
+  nb::class_<DepthCamera>(m, "DepthCamera",
+                          "A depth camera: its size, intrinsics, place, noise and errors.\n\n"
+                          "Pixel (u, v), integer at its centre, u to the right and v down, sees along the ray (x, y, 1) of the optical frame (x right,\n"
+                          "y down, z forward), x = (u - cx)/fx and y = (v - cy)/fy where the lens does not distort. A depth is the z of what is seen.")
+      .def("__init__", &init_camera, nb::arg("name"), nb::kw_only(), nb::arg("width"), nb::arg("height"), nb::arg("fx"), nb::arg("fy"),
+           nb::arg("cx"), nb::arg("cy"), nb::arg("pose"), nb::arg("link") = "", nb::arg("distortion_model") = "none",
+           nb::arg("distortion") = nb::none(), nb::arg("noise") = DepthNoise{}, nb::arg("near") = defaults.near,
+           nb::arg("far") = defaults.far, nb::arg("translation_error") = defaults.translation_error,
+           nb::arg("rotation_error") = defaults.rotation_error, nb::arg("clock_error") = defaults.clock_error,
+           nb::sig("def __init__(self, name: str, *, width: int, height: int, fx: float, fy: float, cx: float, cy: float, "
+                   "pose: numpy.typing.ArrayLike, link: str = '', distortion_model: str = 'none', distortion: numpy.typing.ArrayLike | None = None, "
+                   "noise: DepthNoise = ..., near: float = 0.1, far: float = 4.0, translation_error: float = 0.005, "
+                   "rotation_error: float = 0.005, clock_error: float = 0.005) -> None"),
+           "Args:\n"
+           "    name: by which images come, and name of its source of obstacles.\n"
+           "    width, height: of the image [pixel].\n"
+           "    fx, fy, cx, cy: focal lengths and principal point [pixel].\n"
+           "    pose: (4, 4) of the optical frame in the world; on a link in its frame.\n"
+           "    link: frame of the arm on which it is mounted; '': none.\n"
+           "    distortion_model: 'none', 'brown_conrady' (k1, k2, p1, p2, k3; ROS: plumb_bob), 'inverse_brown_conrady' (RealSense) or\n"
+           "        'kannala_brandt' (k1 to k4; ROS: equidistant).\n"
+           "    distortion: up to 5 coefficients.\n"
+           "    noise: of depths.\n"
+           "    near, far: range in which depths are believed [m].\n"
+           "    translation_error, rotation_error: by how much the pose may be wrong [m], [rad].\n"
+           "    clock_error: the same of times of capture [s].\n"
+           "\n"
+           "Raises ValueError that names the camera, the value and what is allowed.")
+      .def_ro("name", &DepthCamera::name, "By which images come.")
+      .def_ro("width", &DepthCamera::width, "[pixel]")
+      .def_ro("height", &DepthCamera::height, "[pixel]")
+      .def_ro("fx", &DepthCamera::fx, "Focal length [pixel].")
+      .def_ro("fy", &DepthCamera::fy, "Focal length [pixel].")
+      .def_ro("cx", &DepthCamera::cx, "Principal point [pixel].")
+      .def_ro("cy", &DepthCamera::cy, "Principal point [pixel].")
+      .def_prop_ro("distortion_model",
+                   [](const DepthCamera& c) { return std::string(distortion_models[static_cast<std::size_t>(c.distortion_model)].first); },
+                   "Model of the lens.")
+      .def_prop_ro("distortion", [](const DepthCamera& c) { return to_numpy(Eigen::Map<const Eigen::VectorXd>(c.distortion.data(), 5)); },
+                   "Coefficients (5,) of the lens.")
+      .def_ro("link", &DepthCamera::link, "Frame of the arm on which it is mounted; '': none.")
+      .def_prop_ro("pose", [](const DepthCamera& c) { return to_numpy_matrix(c.pose.matrix()); }, "Pose (4, 4) in the world, or on its link.")
+      .def_ro("noise", &DepthCamera::noise, "Noise of depths.")
+      .def_ro("near", &DepthCamera::near, "Least depth [m].")
+      .def_ro("far", &DepthCamera::far, "Largest depth [m].")
+      .def_ro("translation_error", &DepthCamera::translation_error, "Error of the pose [m].")
+      .def_ro("rotation_error", &DepthCamera::rotation_error, "Error of the pose [rad].")
+      .def_ro("clock_error", &DepthCamera::clock_error, "Error of times of capture [s].")
+      .def("project",
+           [](const DepthCamera& c, nb::handle points) {
+             const Eigen::Matrix3Xd p = as_points(points, "points");
+             Eigen::MatrixXd pixels(p.cols(), 2);
+             for (Eigen::Index n = 0; n < p.cols(); ++n) {
+               pixels.row(n) = c.project(p.col(n)).transpose();
+             }
+             return to_numpy_matrix(pixels);
+           },
+           nb::arg("points"), nb::sig("def project(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
+           "Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image.")
+      .def("__repr__", [](const DepthCamera& c) {
+        return "DepthCamera('" + c.name + "', " + std::to_string(c.width) + " × " + std::to_string(c.height) +
+               (c.link.empty() ? "" : ", on '" + c.link + "'") + ")";
+      });
+}
+
+void bind_report(nb::module_& m) {
+  nb::enum_<PixelLabel>(m, "PixelLabel", nb::is_arithmetic(), "What a pixel shows.")
+      .value("nothing", PixelLabel::nothing, "No depth, or one that is too near.")
+      .value("obstacle", PixelLabel::obstacle, "Something that is not the arm.")
+      .value("arm", PixelLabel::arm, "The arm, or an object that it holds.")
+      .value("edge", PixelLabel::edge, "A depth between two surfaces, which is on neither: a flying pixel.")
+      .value("explained", PixelLabel::explained, "A shape that was told.")
+      .value("left_out", PixelLabel::left_out, "In a region that is left out.")
+      .value("outside", PixelLabel::outside, "Beyond the range of the camera.");
+  nb::class_<ArmResidual>(m, "ArmResidual", "How far what a camera sees is from where the arm should be: of rays through the cores of its cover.")
+      .def_ro("rays", &ArmResidual::rays, "Rays with a depth.")
+      .def_ro("on_arm", &ArmResidual::on_arm, "Those that end on the arm.")
+      .def_ro("through", &ArmResidual::through, "Those that end behind it.")
+      .def_ro("depth_error", &ArmResidual::depth_error, "Mean of the measured depth less that of the grown cover, of those on the arm [m].")
+      .def_prop_ro("through_share", &ArmResidual::through_share, "Share of rays that see through the arm, of those that nothing hides.");
+  using R = PerceptionReport;
+  nb::class_<R>(m, "PerceptionReport", "What became of an image, and what it cost.")
+      .def_ro("used", &R::used, "False: nobody knows where the arm was at the time of capture, or the image shows nothing; obstacles are as before.")
+      .def_ro("obstacle_pixels", &R::obstacle_pixels, "Number of pixels that show something else than the arm.")
+      .def_ro("arm_pixels", &R::arm_pixels, "Number of pixels that show the arm.")
+      .def_ro("edge_pixels", &R::edge_pixels, "Number of flying pixels.")
+      .def_ro("seen", &R::seen, "Number of obstacles that this camera shows now.")
+      .def_ro("remembered", &R::remembered, "Number of those that no camera shows now.")
+      .def_ro("explained", &R::explained, "Number of cells that told shapes explain, or that are left out.")
+      .def_ro("unseen", &R::unseen, "Number of obstacles where nobody has looked.")
+      .def_ro("arm", &R::arm, "Where the arm is, of this image.")
+      .def_ro("through", &R::through, "Share of rays that see through the arm, smoothed over half a second.")
+      .def_ro("question", &R::question, "What is hard to believe, in words; empty: nothing.")
+      .def_ro("depth_time", &R::depth_time, "Time for depths and edges [s].")
+      .def_ro("mask_time", &R::mask_time, "Time to take the arm out [s].")
+      .def_ro("map_time", &R::map_time, "Time for points and map [s].")
+      .def_ro("unseen_time", &R::unseen_time, "Time for unseen space [s].")
+      .def_ro("obstacles_time", &R::obstacles_time, "Time to hand obstacles to the controller [s].")
+      .def_prop_ro("total_time", &R::total_time, "Sum of the times [s].");
+}
+
+nb::dict cells_of(const Perception& self) {
+  const std::vector<Perception::Cell> cells = self.cells();
+  const auto num = static_cast<Eigen::Index>(cells.size());
+  Eigen::Matrix3Xd centres(3, num);
+  Eigen::VectorXd radii(num), ages(num), cameras(num), remembered(num), hidden(num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const Perception::Cell& cell = cells[static_cast<std::size_t>(n)];
+    centres.col(n) = cell.centre;
+    radii[n] = cell.radius;
+    ages[n] = cell.age;
+    cameras[n] = cell.camera;
+    remembered[n] = cell.is_remembered ? 1.0 : 0.0;
+    hidden[n] = cell.is_hidden ? 1.0 : 0.0;
+  }
+  nb::dict all;
+  all["centres"] = to_numpy_points(centres);
+  all["radii"] = to_numpy(radii);
+  all["ages"] = to_numpy(ages);
+  all["cameras"] = to_numpy(cameras).attr("astype")("int64");
+  all["remembered"] = to_numpy(remembered).attr("astype")("bool");
+  all["hidden"] = to_numpy(hidden).attr("astype")("bool");
+  return all;
+}
+
+}  // namespace
+
+void bind_perception(nb::module_& m) {
+  bind_camera(m);
+  bind_report(m);
+  bind_settings<PerceptionSettings>(m, "PerceptionSettings", "How what cameras see becomes obstacles.");
+  nb::class_<Perception>(m, "Perception",
+                         "From depth cameras to the obstacles of a controller: takes the arm out of the image, remembers what is hidden, and hands\n"
+                         "the rest on.\n\n"
+                         "Each camera is a source of the controller, of its name. What no camera shows now is the source 'memory'; where nobody has\n"
+                         "looked, if that counts as occupied, 'unseen'. Calls from several threads wait for each other; none waits for `step`.")
+      .def(
+          "__init__",
+          [](Perception* self, Controller& controller, const std::vector<DepthCamera>& cameras, nb::handle settings) {
+            new (self) Perception(controller, cameras, settings.is_none() ? PerceptionSettings{} : as_instance<PerceptionSettings>(settings, "settings", "PerceptionSettings"));
+          },
+          nb::arg("controller"), nb::arg("cameras"), nb::arg("settings") = nb::none(), nb::keep_alive<1, 2>(),
+          nb::sig("def __init__(self, controller: Controller, cameras: collections.abc.Sequence[DepthCamera], settings: PerceptionSettings | None = None) -> None"),
+          "Raises ValueError that names the camera or the setting, its value and what is allowed.")
+      .def(
+          "update",
+          [](Perception& self, const std::string& camera, nb::handle depth, nb::handle time, nb::handle unit, nb::handle q) {
+            const Pixels pixels = as_depth(depth, camera_of(self, camera), unit);
+            const double captured = as_capture_time(time);
+            const Eigen::VectorXd state = as_state(q);
+            const nb::gil_scoped_release release;
+            return self.update(camera, pixels.raw, captured, state);
+          },
+          nb::arg("camera"), nb::arg("depth"), nb::kw_only(), nb::arg("time"), nb::arg("unit") = nb::none(), nb::arg("q") = nb::none(),
+          nb::sig("def update(self, camera: str, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None, "
+                  "q: numpy.typing.ArrayLike | None = None) -> PerceptionReport"),
+          "Takes an image of a camera, and gives the controller what it shows.\n"
+          "\n"
+          "Args:\n"
+          "    camera: its name.\n"
+          "    depth: (height, width) uint16 or float; 0, nan and inf: nothing seen.\n"
+          "    time: when it was captured [s], on the clock of `step`.\n"
+          "    unit: of a depth [m]; None: 0.001 of uint16, 1 of float.\n"
+          "    q: (nv,) of the arm at that time; None: as `step` was told.\n"
+          "\n"
+          "Returns what became of it. Raises ValueError or TypeError that names the value and what is allowed.")
+      .def(
+          "update_points",
+          [](Perception& self, const std::string& camera, nb::handle points, nb::handle time, nb::handle q) {
+            Eigen::Matrix3Xd given = Eigen::Matrix3Xd(3, 0);
+            const nb::object flat = nb::module_::import_("numpy").attr("asarray")(points, "float64").attr("reshape")(-1, 3);
+            const auto rows = nb::cast<nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(flat);
+            given = Eigen::Map<const Eigen::Matrix3Xd>(rows.data(), 3, static_cast<Eigen::Index>(rows.shape(0)));
+            const double captured = as_capture_time(time);
+            const Eigen::VectorXd state = as_state(q);
+            const nb::gil_scoped_release release;
+            return self.update(camera, given, captured, state);
+          },
+          nb::arg("camera"), nb::arg("points"), nb::kw_only(), nb::arg("time"), nb::arg("q") = nb::none(),
+          nb::sig("def update_points(self, camera: str, points: numpy.typing.ArrayLike, *, time: float, q: numpy.typing.ArrayLike | None = None) "
+                  "-> PerceptionReport"),
+          "The same of a cloud in the camera's optical frame [m]: (N, 3), or organised (height, width, 3); nan: nothing seen.")
+      .def(
+          "leave_out",
+          [](Perception& self, const std::string& name, nb::handle region, double grow, const std::string& link) {
+            self.leave_out(name, as_obstacles(region), grow, link);
+          },
+          nb::arg("name"), nb::arg("region"), nb::kw_only(), nb::arg("grow") = 0.02, nb::arg("link") = "",
+          nb::sig("def leave_out(self, name: str, region: Obstacles | sidestep.obstacles.Shape | collections.abc.Sequence[Obstacles | "
+                  "sidestep.obstacles.Shape], *, grow: float = 0.02, link: str = '') -> None"),
+          "What is within `grow` [m] of the region is no obstacle: what is to be grasped, or a place where noise is known. In the world, or\n"
+          "in the frame of a link. Replaces a region of the same name.")
+      .def("take_in", &Perception::take_in, nb::arg("name"), "Undoes `leave_out`. Raises ValueError that lists the regions.")
+      .def("forget", &Perception::forget, "Forgets all that was seen.")
+      .def_prop_ro("cameras", &Perception::cameras, "The cameras.")
+      .def_prop_ro("settings", [](const Perception& self) { return self.settings(); }, "The settings.")
+      .def("pose", [](const Perception& self, const std::string& camera) { return to_numpy_matrix(self.pose(camera).matrix()); }, nb::arg("camera"),
+           nb::sig("def pose(self, camera: str) -> numpy.typing.NDArray[numpy.float64]"), "Pose (4, 4) of a camera in the world at its last image.")
+      .def("time", &Perception::time, nb::arg("camera"), "Time of capture of its last image [s]; nan before the first.")
+      .def("depth", [](const Perception& self, const std::string& camera) { return image_array(self.depth(camera), camera_of(self, camera)); },
+           nb::arg("camera"), nb::sig("def depth(self, camera: str) -> numpy.typing.NDArray[numpy.float32]"),
+           "Depth [m] of the last image (height, width); 0: nothing seen.")
+      .def("labels", [](const Perception& self, const std::string& camera) { return image_array(self.labels(camera), camera_of(self, camera)); },
+           nb::arg("camera"), nb::sig("def labels(self, camera: str) -> numpy.typing.NDArray[numpy.uint8]"),
+           "What each pixel of the last image shows (height, width), a PixelLabel each.")
+      .def("cells", &cells_of, nb::sig("def cells(self) -> dict[str, numpy.typing.NDArray[typing.Any]]"),
+           "The obstacles that were handed to the controller: centres (N, 3) [m], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):\n"
+           "no camera shows it now, hidden (N,): something is in front of it.")
+      .def("unseen", [](const Perception& self) { return to_numpy_points(self.unseen()); }, nb::sig("def unseen(self) -> numpy.typing.NDArray[numpy.float64]"),
+           "Middles (N, 3) of cells where nobody has looked and that border on seen space [m].");
+}
+
+}  // namespace sidestep::python

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "sidestep/perception/depth_camera.hpp"
+
+namespace sidestep {
+
+/// What a pixel shows.
+enum class PixelLabel : std::uint8_t {
+  nothing,    ///< no depth, or one that is too near
+  obstacle,   ///< something that is not the arm
+  arm,        ///< the arm, or an object that it holds
+  edge,       ///< a depth between two surfaces, which is on neither: a flying pixel
+  explained,  ///< a shape that was told
+  left_out,   ///< in a region that is left out
+  outside,    ///< beyond the range of the camera, which sees to its end
+};
+
+/// Depths as a camera gives them, row by row: numbers in units of `unit` [m], or metres. 0, NaN and infinity: nothing seen.
+struct RawDepth {
+  std::variant<std::span<const std::uint16_t>, std::span<const float>> pixels;
+  double unit = 0.001;  ///< [m]; of whole numbers and of floats alike
+};
+
+/// An image of depths that were checked, and what its pixels show.
+///
+/// A pixel is flying where fewer than two of its eight neighbours have its depth but for noise and slope:
+/// |z - z'| <= 4 σ(z) + `slope` z.
+class DepthImage {
+ public:
+  explicit DepthImage(const DepthCamera& camera);
+
+  /// Takes an image over. Throws std::invalid_argument where its size is another. No allocation.
+  void take(const DepthCamera& camera, const RawDepth& raw);
+  /// The same of points (3 × N) in the optical frame: each pixel takes the nearest.
+  void take(const DepthCamera& camera, const Eigen::Ref<const Eigen::Matrix3Xd>& points);
+
+  int width() const noexcept { return width_; }
+  int height() const noexcept { return height_; }
+  const float* depth() const noexcept { return depth_.data(); }  ///< [m], 0: nothing; may be beyond the range
+  const PixelLabel* labels() const noexcept { return labels_.data(); }
+  PixelLabel* labels() noexcept { return labels_.data(); }
+  std::size_t size() const noexcept { return depth_.size(); }
+
+ private:
+  void mark_edges(const DepthCamera& camera) noexcept;
+
+  int width_, height_;
+  std::vector<float> depth_;
+  std::vector<float> tolerance_, support_;  // of one row: difference of depths on one surface [m]; neighbours on it
+  std::vector<PixelLabel> labels_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "sidestep/perception/depth_camera.hpp"
+#include "sidestep/perception/depth_image.hpp"
+#include "sidestep/perception/perception_settings.hpp"
+#include "sidestep/perception/voxel_grid.hpp"
+
+namespace sidestep {
+
+/// A cell in which something was seen.
+struct Voxel {
+  float low[3], high[3];            ///< Box of what is in it [m], in the world.
+  float frame_low[3], frame_high[3];  ///< The same of the last image that showed it.
+  float error;                      ///< By how much what is in it may be elsewhere [m]: calibration of its camera, there.
+  double first, last;               ///< Times of the first and the last image that showed it [s].
+  std::uint32_t frame;              ///< Number of that image.
+  int cell;                         ///< In the grid; -1: the voxel is not in use.
+  int pixels;                       ///< Number of pixels of that image that showed it.
+  std::uint8_t camera;              ///< Camera that showed it last.
+  std::uint8_t free_images;         ///< Images in a row that saw through it.
+  bool counts;                      ///< It is an obstacle; else a second image must show it.
+  bool is_hidden;                   ///< The last image that could have shown it did not, since something is in front of it.
+};
+
+/// An image with all that says what its rays have seen.
+struct SeenImage {
+  const DepthCamera& camera;
+  const CameraRays& rays;
+  const Eigen::Isometry3d& X_WC;
+  const DepthImage& image;
+  const float* arm_front;  ///< Depth from which on the arm hides what is behind, per pixel [m].
+  std::uint8_t number;     ///< of the camera
+  double time;             ///< of capture [s]
+
+  /// Depth up to which a pixel sees [m], of one that shows something: the arm is hidden where it begins.
+  double sees_to(std::size_t pixel) const noexcept {
+    const float depth = image.labels()[pixel] == PixelLabel::arm ? arm_front[pixel] : image.depth()[pixel];
+    return std::min(static_cast<double>(depth), camera.far);
+  }
+};
+
+/// What cameras have seen: cells with points, until they are seen to be free or are forgotten.
+///
+/// An image adds its points to their cells. Then each cell that it did not show is projected into it: where its depth is behind the
+/// whole cell, the cell was seen through, and after `clear_after` such images in a row it is free. Where something is in front of it, the
+/// arm is, or nothing was seen, it is hidden, and kept for `memory`.
+class VoxelMap {
+ public:
+  VoxelMap(const Eigen::Vector3d& centre, double reach, const PerceptionSettings& settings);
+
+  /// Adds an image. May allocate while the number of voxels grows.
+  void add(const SeenImage& seen);
+
+  /// All voxels; those with a negative cell are not in use.
+  const std::vector<Voxel>& voxels() const noexcept { return voxels_; }
+  /// Index of the voxel of a point, -1: none.
+  int voxel_of(const float* p) const noexcept {
+    const int cell = grid_.cell(p);
+    return cell < 0 ? -1 : index_[static_cast<std::size_t>(cell)];
+  }
+  double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
+  const VoxelGrid& grid() const noexcept { return grid_; }
+  /// Number of points of the last image that were too far away.
+  int num_outside() const noexcept { return num_outside_; }
+  /// Number of the last image, from 1 on.
+  std::uint32_t frame() const noexcept { return frame_; }
+  void clear() noexcept;
+
+ private:
+  void add_points(const SeenImage& seen);
+  Voxel& voxel_at(int cell, double time);
+  void begin_frame(Voxel& voxel, const SeenImage& seen) noexcept;
+  void end_frame(Voxel& voxel, const SeenImage& seen) noexcept;
+  /// What an image says of a cell that it did not show.
+  enum class Sight { elsewhere, hidden, free };
+  Sight sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
+  void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
+  void remove(Voxel& voxel) noexcept;
+
+  PerceptionSettings settings_;
+  VoxelGrid grid_;
+  std::vector<int> index_;  // Index of the voxel of each cell; -1: none.
+  std::vector<Voxel> voxels_;
+  std::vector<int> unused_;   // Indices of voxels that are not in use.
+  std::vector<int> touched_;  // Indices of those that the image showed.
+  std::uint32_t frame_ = 0;
+  int num_outside_ = 0;
+};
+
+}  // namespace sidestep

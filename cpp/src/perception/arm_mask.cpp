@@ -1,0 +1,157 @@
+#include "sidestep/perception/arm_mask.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sidestep {
+namespace {
+
+constexpr float noise_of_depth = 3.0f;   // Noise along the ray that a pixel of the arm may have, in standard deviations.
+constexpr double pixels_at_edge = 1.0;   // Error of a silhouette [pixel].
+constexpr double core_share = 0.5;       // Semi-axes of an ellipsoid's core, as a share of its own: links fill it.
+constexpr int core_stride = 4;           // Every how many pixels rays through cores are looked at, in both directions.
+constexpr float no_front = std::numeric_limits<float>::infinity();
+
+/// The displacement of the farthest point of an ellipsoid between two states [m], at most.
+double displacement(const BodyEllipsoid& ellipsoid, const KinematicState& from, const KinematicState& to) noexcept {
+  const KinematicState::Link &a = link_or_world(from, ellipsoid.joint), &b = link_or_world(to, ellipsoid.joint);
+  const Eigen::Vector3d moved = (b.R_WL - a.R_WL) * ellipsoid.mean + b.p_WL - a.p_WL;
+  return moved.norm() + ellipsoid.extent * (b.R_WL - a.R_WL).norm() / std::sqrt(2.0);
+}
+
+}  // namespace
+
+double ArmResidual::through_share() const noexcept {
+  const int open = on_arm + through;
+  return open > 0 ? static_cast<double>(through) / open : 0.0;
+}
+
+ArmMask::ArmMask(const Robot& robot, const Body& body)
+    : ellipsoids_(body_ellipsoids(robot, body, "perception")), growth_(ellipsoids_.size()) {
+  cores_.reserve(ellipsoids_.size());
+}
+
+ArmMask::Seen ArmMask::see(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, const CameraRays& rays) noexcept {
+  const Eigen::Matrix3d A = shape.inverse();
+  const Eigen::Vector3d b = A * centre;
+  const double gamma = centre.dot(b) - 1.0;
+  Seen seen{};
+  const double a[6] = {A(0, 0), A(1, 1), 2.0 * A(0, 1), 2.0 * A(0, 2), 2.0 * A(1, 2), A(2, 2)};
+  std::transform(a, a + 6, seen.a, [](double number) { return static_cast<float>(number); });
+  std::transform(b.data(), b.data() + 3, seen.b, [](double number) { return static_cast<float>(number); });
+  seen.gamma = static_cast<float>(gamma);
+  seen.holds_camera = gamma <= 0.0;
+
+  // Bounds of x and y: planes through the camera that touch the ellipsoid, n = (1, 0, -x) and (0, 1, -y), nᵀ (S - c cᵀ) n = 0.
+  const Eigen::Matrix3d C = shape - centre * centre.transpose();
+  constexpr double all = std::numeric_limits<double>::infinity();
+  double low[2] = {-all, -all}, high[2] = {all, all};
+  if (C(2, 2) < 0.0 && centre.z() > 0.0) {
+    for (int axis = 0; axis < 2; ++axis) {
+      const double root = std::sqrt(std::max(0.0, C(axis, 2) * C(axis, 2) - C(axis, axis) * C(2, 2)));
+      low[axis] = (C(axis, 2) + root) / C(2, 2);
+      high[axis] = (C(axis, 2) - root) / C(2, 2);
+    }
+  } else if (centre.z() + std::sqrt(shape(2, 2)) <= 0.0) {
+    return seen;  // behind the camera: an empty window
+  }
+  seen.window = rays.window(low[0], high[0], low[1], high[1]);
+  return seen;
+}
+
+double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const Eigen::Isometry3d& X_WC,
+                          const ArmStates& arm) const noexcept {
+  const KinematicState::Link& link = link_or_world(*arm.now, ellipsoid.joint);
+  const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - X_WC.translation()).norm();
+  const double moved = std::max(displacement(ellipsoid, *arm.before, *arm.now), displacement(ellipsoid, *arm.now, *arm.after));
+  return camera.translation_error + camera.rotation_error * distance + pixels_at_edge * distance / std::min(camera.fx, camera.fy) + moved;
+}
+
+void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const Eigen::Isometry3d& X_WC, const ArmStates& arm,
+                   DepthImage& image) noexcept {
+  front_.assign(image.size(), no_front);
+  arm_.assign(image.size(), 0.0f);
+  cores_.clear();
+  const Eigen::Isometry3d X_CW = X_WC.inverse();
+  for (std::size_t k = 0; k < ellipsoids_.size(); ++k) {
+    const BodyEllipsoid& ellipsoid = ellipsoids_[k];
+    const KinematicState::Link& link = link_or_world(*arm.now, ellipsoid.joint);
+    const Eigen::Vector3d centre = X_CW * (link.R_WL * ellipsoid.mean + link.p_WL);
+    const Eigen::Matrix3d R = X_CW.linear() * link.R_WL;
+    const Eigen::Matrix3d shape = R * ellipsoid.shape * R.transpose();
+    const double growth = growth_[k] = growth_of(ellipsoid, camera, X_WC, arm);
+    const double mean_axis = std::sqrt(shape.trace() / 3.0);
+    const Eigen::Matrix3d grown =
+        (1.0 + growth / mean_axis) * shape + (growth + mean_axis) * growth * Eigen::Matrix3d::Identity();
+    mark(see(centre, grown, rays), camera, rays, image);
+    cores_.push_back(see(centre, core_share * core_share * shape, rays));
+  }
+  PixelLabel* const labels = image.labels();
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    if (arm_[i] > 0.0f) {
+      labels[i] = PixelLabel::arm;
+    }
+  }
+  residual_ = {};
+  depth_errors_ = 0.0;
+  for (const Seen& core : cores_) {
+    if (!core.holds_camera) {
+      measure(core, camera, rays, image);
+    }
+  }
+  residual_.depth_error = residual_.on_arm > 0 ? depth_errors_ / residual_.on_arm : 0.0;
+}
+
+void ArmMask::mark(const Seen& seen, const DepthCamera& camera, const CameraRays& rays, DepthImage& image) noexcept {
+  const auto constant = noise_of_depth * static_cast<float>(camera.noise.constant);
+  const auto quadratic = noise_of_depth * static_cast<float>(camera.noise.quadratic);
+  const Seen s = seen;
+  const bool hides = !seen.holds_camera;
+  for (int v = s.window.v0; v < s.window.v1; ++v) {
+    const auto row = static_cast<std::ptrdiff_t>(v) * image.width();
+    const float* __restrict__ const x = rays.x() + row;
+    const float* __restrict__ const y = rays.y() + row;
+    const float* __restrict__ const z = image.depth() + row;
+    float* __restrict__ const front = front_.data() + row;
+    float* __restrict__ const arm = arm_.data() + row;
+    for (int u = s.window.u0; u < s.window.u1; ++u) {
+      const float a = x[u] * (s.a[0] * x[u] + s.a[2] * y[u] + s.a[3]) + y[u] * (s.a[1] * y[u] + s.a[4]) + s.a[5];
+      const float b = s.b[0] * x[u] + s.b[1] * y[u] + s.b[2];
+      const float square = b * b - a * s.gamma;
+      const float root = std::sqrt(std::max(square, 0.0f));
+      const float inverse = 1.0f / a;
+      const float first = (b - root) * inverse, last = (b + root) * inverse;
+      const float noise = constant + quadratic * z[u] * z[u];
+      const bool hit = square >= 0.0f && last > 0.0f;
+      front[u] = hit && hides && first < front[u] ? first : front[u];
+      arm[u] = hit && z[u] > 0.0f && z[u] >= first - noise && z[u] <= last + noise ? 1.0f : arm[u];
+    }
+  }
+}
+
+void ArmMask::measure(const Seen& core, const DepthCamera& camera, const CameraRays& rays, const DepthImage& image) noexcept {
+  const int u0 = (core.window.u0 + core_stride - 1) / core_stride * core_stride;
+  const int v0 = (core.window.v0 + core_stride - 1) / core_stride * core_stride;
+  for (int v = v0; v < core.window.v1; v += core_stride) {
+    for (int u = u0; u < core.window.u1; u += core_stride) {
+      const std::size_t i = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width()) + static_cast<std::size_t>(u);
+      const float x = rays.x()[i], y = rays.y()[i], z = image.depth()[i];
+      const float a = x * (core.a[0] * x + core.a[2] * y + core.a[3]) + y * (core.a[1] * y + core.a[4]) + core.a[5];
+      const float b = core.b[0] * x + core.b[1] * y + core.b[2];
+      if (b * b < a * core.gamma || b <= 0.0f || image.labels()[i] == PixelLabel::nothing || image.labels()[i] == PixelLabel::edge) {
+        continue;
+      }
+      ++residual_.rays;
+      if (image.labels()[i] == PixelLabel::arm) {
+        ++residual_.on_arm;
+        depth_errors_ += static_cast<double>(z - front_[i]);
+      } else if (static_cast<double>(z) > static_cast<double>(front_[i]) + noise_of_depth * camera.noise.sigma(static_cast<double>(z))) {
+        ++residual_.through;
+      }
+    }
+  }
+}
+
+}  // namespace sidestep

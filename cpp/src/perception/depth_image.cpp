@@ -1,0 +1,117 @@
+#include "sidestep/perception/depth_image.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace sidestep {
+namespace {
+
+constexpr float slope_share = 0.03f;  // Difference of neighbouring depths on a slanted surface, as a share of the depth.
+constexpr float noise_reach = 4.0f;   // The same by noise, in standard deviations.
+constexpr float least_support = 1.5f; // Neighbours on the same surface, below which a pixel is flying: two count.
+
+void check_size(const DepthCamera& camera, std::size_t size) {
+  const auto expected = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (size != expected) {
+    throw std::invalid_argument("camera '" + camera.name + "': the image has " + std::to_string(size) + " pixels, allowed: " +
+                                std::to_string(camera.width) + " × " + std::to_string(camera.height));
+  }
+}
+
+constexpr float farthest = 1e4f;  // Depth above which a number stands for nothing seen [m].
+
+/// Depth in metres, 0 where nothing was seen or it is too near.
+void convert(const float* raw, float unit, float low, std::size_t size, float* depth) noexcept {
+  for (std::size_t i = 0; i < size; ++i) {
+    const float z = raw[i] * unit;
+    depth[i] = z >= low && z <= farthest ? z : 0.0f;
+  }
+}
+void convert(const std::uint16_t* raw, float unit, float low, std::size_t size, float* depth) noexcept {
+  for (std::size_t i = 0; i < size; ++i) {
+    const float z = static_cast<float>(static_cast<int>(raw[i])) * unit;
+    depth[i] = z >= low ? z : 0.0f;
+  }
+}
+
+/// Adds to `support` where a neighbour is on the same surface.
+void add_support(const float* z, const float* neighbour, const float* tolerance, int begin, int end, float* support) noexcept {
+  for (int u = begin; u < end; ++u) {
+    support[u] += std::abs(z[u] - neighbour[u]) <= tolerance[u] ? 1.0f : 0.0f;
+  }
+}
+
+}  // namespace
+
+DepthImage::DepthImage(const DepthCamera& camera)
+    : width_(camera.width),
+      height_(camera.height),
+      depth_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
+      tolerance_(static_cast<std::size_t>(camera.width)),
+      support_(tolerance_.size()),
+      labels_(depth_.size()) {}
+
+void DepthImage::take(const DepthCamera& camera, const RawDepth& raw) {
+  const auto low = static_cast<float>(camera.near);
+  std::visit(
+      [&](const auto& pixels) {
+        check_size(camera, pixels.size());
+        convert(pixels.data(), static_cast<float>(raw.unit), low, pixels.size(), depth_.data());
+      },
+      raw.pixels);
+  mark_edges(camera);
+}
+
+void DepthImage::take(const DepthCamera& camera, const Eigen::Ref<const Eigen::Matrix3Xd>& points) {
+  std::fill(depth_.begin(), depth_.end(), 0.0f);
+  for (Eigen::Index n = 0; n < points.cols(); ++n) {
+    const Eigen::Vector3d p = points.col(n);
+    if (!(p.z() >= camera.near) || !p.allFinite()) {
+      continue;
+    }
+    const Eigen::Vector2d pixel = camera.project(p);
+    const double u = std::round(pixel.x()), v = std::round(pixel.y());
+    if (u >= 0.0 && v >= 0.0 && u < width_ && v < height_) {
+      float& depth = depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u)];
+      const auto z = static_cast<float>(p.z());
+      depth = depth > 0.0f ? std::min(depth, z) : z;
+    }
+  }
+  mark_edges(camera);
+}
+
+void DepthImage::mark_edges(const DepthCamera& camera) noexcept {
+  const auto constant = noise_reach * static_cast<float>(camera.noise.constant);
+  const auto quadratic = noise_reach * static_cast<float>(camera.noise.quadratic);
+  const auto far = static_cast<float>(camera.far);
+  for (int v = 0; v < height_; ++v) {
+    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_);
+    const float* const z = depth_.data() + row;
+    for (int u = 0; u < width_; ++u) {
+      tolerance_[static_cast<std::size_t>(u)] = z[u] > 0.0f ? constant + z[u] * (slope_share + quadratic * z[u]) : -1.0f;
+      support_[static_cast<std::size_t>(u)] = 0.0f;
+    }
+    for (int dv = -1; dv <= 1; ++dv) {
+      if (v + dv < 0 || v + dv >= height_) {
+        continue;
+      }
+      const float* const other = z + dv * width_;
+      add_support(z, other - 1, tolerance_.data(), 1, width_, support_.data());
+      add_support(z, other + 1, tolerance_.data(), 0, width_ - 1, support_.data());
+      if (dv != 0) {
+        add_support(z, other, tolerance_.data(), 0, width_, support_.data());
+      }
+    }
+    PixelLabel* const label = labels_.data() + row;
+    for (int u = 0; u < width_; ++u) {
+      label[u] = !(z[u] > 0.0f)                                            ? PixelLabel::nothing
+                 : z[u] > far                                              ? PixelLabel::outside
+                 : support_[static_cast<std::size_t>(u)] < least_support ? PixelLabel::edge
+                                                                           : PixelLabel::obstacle;
+    }
+  }
+}
+
+}  // namespace sidestep

@@ -1,0 +1,253 @@
+// What the map holds, as obstacles of the controller.
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "impl.hpp"
+#include "nearby.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double border_period = 0.2;   // Time between two searches for the border of unseen space [s].
+constexpr double noise_explained = 3.0; // Noise of a depth that a told shape explains, in standard deviations.
+constexpr double grown = 0.002;         // Growth of a box since it was compared, from which on it is compared again [m].
+
+Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
+Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
+Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
+double radius_of(const Voxel& voxel) { return 0.5 * (high_of(voxel) - low_of(voxel)).norm() + static_cast<double>(voxel.error); }
+
+Obstacles balls(const std::vector<Voxel>& voxels, const std::vector<int>& chosen) {
+  if (chosen.empty()) {
+    return Obstacles::none();
+  }
+  const auto num = static_cast<Eigen::Index>(chosen.size());
+  Eigen::Matrix3Xd points(3, num);
+  Eigen::VectorXd radii(num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const Voxel& voxel = voxels[static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)])];
+    points.col(n) = centre_of(voxel);
+    radii[n] = radius_of(voxel);
+  }
+  return Obstacles(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+}
+
+/// The farthest that an ellipsoid of an arm can be from the arm's base, whatever its joints do [m].
+double reach_of(const Arm& arm, Eigen::Vector3d& centre) {
+  const Robot& robot = arm.robot();
+  std::vector<double> reach(static_cast<std::size_t>(robot.num_joints()), 0.0);
+  centre = robot.num_joints() > 0 ? Eigen::Vector3d(robot.joints().front().X_PJ.translation()) : Eigen::Vector3d::Zero();
+  for (int j = 0; j < robot.num_joints(); ++j) {
+    const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];
+    const double before = joint.parent < 0 ? (joint.X_PJ.translation() - centre).norm()
+                                           : reach[static_cast<std::size_t>(joint.parent)] + joint.X_PJ.translation().norm();
+    double slides = 0.0;
+    if (joint.type == JointType::prismatic) {
+      const JointLimits& limits = robot.limits();
+      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
+      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
+      slides = std::max(std::abs(low), std::abs(high));
+    }
+    reach[static_cast<std::size_t>(j)] = before + (std::isfinite(slides) ? slides : 0.0);
+  }
+  double farthest = 0.0;
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, arm.body(), "perception")) {
+    const double base = ellipsoid.joint < 0 ? (ellipsoid.mean - centre).norm()
+                                            : reach[static_cast<std::size_t>(ellipsoid.joint)] + ellipsoid.mean.norm();
+    farthest = std::max(farthest, base + ellipsoid.extent);
+  }
+  return farthest;
+}
+
+VoxelMap make_map(const Arm& arm, const PerceptionSettings& settings) {
+  Eigen::Vector3d centre;
+  const double reach = reach_of(arm, centre);
+  return VoxelMap(centre, reach, settings);
+}
+
+}  // namespace
+
+Perception::Impl::View::View(const DepthCamera& its, const Arm& arm)
+    : camera(its),
+      rays(its),
+      image(its),
+      mask(arm.robot(), arm.body()),
+      frame_of_arm(its.link.empty() ? -1 : arm.robot().frame_index(its.link)),
+      X_WC(its.pose) {}
+
+Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras, const PerceptionSettings& chosen)
+    : controller(its),
+      settings(chosen),
+      arm(its.arm()),
+      zero(Eigen::VectorXd::Zero(arm->num_coordinates())),
+      before(arm->robot()),
+      now(arm->robot()),
+      after(arm->robot()),
+      map(make_map(*arm, chosen)) {
+  views.reserve(cameras.size());
+  for (const DepthCamera& camera : cameras) {
+    views.emplace_back(camera, *arm);
+  }
+  if (!settings.unseen_is_free) {
+    Eigen::Vector3d centre;
+    const double reach = reach_of(*arm, centre);
+    unseen.emplace(centre, reach, settings);
+  }
+}
+
+std::size_t Perception::Impl::index(const std::string& camera) const {
+  std::string names;
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    if (views[n].camera.name == camera) {
+      return n;
+    }
+    names += (n == 0 ? "'" : ", '") + views[n].camera.name + "'";
+  }
+  throw std::invalid_argument("perception: there is no camera '" + camera + "', there are: " + names);
+}
+
+void Perception::Impl::refresh_arm() {
+  Arm current = controller.arm();
+  if (current.content_hash() != arm->content_hash()) {
+    arm = std::move(current);
+    for (View& view : views) {
+      view.mask = ArmMask(arm->robot(), arm->body());
+    }
+  }
+}
+
+Eigen::Isometry3d Perception::Impl::pose_of(const View& view) const {
+  return view.frame_of_arm < 0 ? view.camera.pose : frame_pose(arm->robot(), now, view.frame_of_arm) * view.camera.pose;
+}
+
+void Perception::Impl::add_unseen(const SeenImage& seen) {
+  unseen->add(seen);
+  for (const BodyEllipsoid& ellipsoid : views.front().mask.ellipsoids()) {
+    const KinematicState::Link& link = link_or_world(now, ellipsoid.joint);
+    unseen->add_arm(link.R_WL * ellipsoid.mean + link.p_WL, link.R_WL * ellipsoid.shape * link.R_WL.transpose(), seen.time);
+  }
+  if (std::abs(seen.time - unseen_time) >= border_period) {
+    unseen_time = seen.time;
+    border = unseen->border(seen.time);
+    const Eigen::Index num = border.cols();
+    controller.set_obstacles(num == 0 ? Obstacles::none()
+                                      : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
+                             {unseen_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
+  }
+}
+
+bool Perception::Impl::is_explained(std::size_t number, const Obstacles* told) {
+  const Voxel& voxel = map.voxels()[number];
+  Tested& last = tested[number];
+  const std::uint64_t version = told == nullptr ? 0 : told->version();
+  const bool has_grown = (low_of(voxel) - Eigen::Vector3f(last.low).cast<double>()).minCoeff() < -grown ||
+                         (high_of(voxel) - Eigen::Vector3f(last.high).cast<double>()).maxCoeff() > grown;
+  if (last.cell == voxel.cell && last.version == version && !has_grown) {
+    return last.is_explained;
+  }
+  std::copy(voxel.low, voxel.low + 3, last.low);
+  std::copy(voxel.high, voxel.high + 3, last.high);
+  last.cell = voxel.cell;
+  last.version = version;
+  last.is_explained = false;
+  if (told != nullptr) {
+    const View& view = views[voxel.camera];
+    const Eigen::Vector3d centre = centre_of(voxel);
+    const double depth = (centre - view.X_WC.translation()).norm();
+    const double error = static_cast<double>(voxel.error) + noise_explained * view.camera.noise.sigma(depth);
+    const double thin = 0.5 * (high_of(voxel) - low_of(voxel)).minCoeff();
+    last.is_explained = distance_to(*told, centre, error + 1e-6) + thin <= error;
+  }
+  return last.is_explained;
+}
+
+bool Perception::Impl::is_left_out(const Voxel& voxel) const {
+  for (const Region& region : regions) {
+    const Eigen::Vector3d centre =
+        region.frame < 0 ? centre_of(voxel) : Eigen::Vector3d(frame_pose(arm->robot(), now, region.frame).inverse() * centre_of(voxel));
+    if (distance_to(region.balls, centre, region.grow + 1e-6) <= region.grow) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
+  const std::shared_ptr<const Obstacles> told = controller.obstacles_of(SourceOptions::scene);
+  const std::vector<Voxel>& voxels = map.voxels();
+  tested.resize(voxels.size());
+  is_excluded.resize(voxels.size());
+  std::vector<int> shown, remembered;
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    const Voxel& voxel = voxels[n];
+    if (voxel.cell < 0 || !voxel.counts) {
+      continue;
+    }
+    const bool is_current = is_shown(voxel);
+    if (is_current && voxel.camera == number) {
+      is_excluded[n] = is_explained(n, told.get()) || is_left_out(voxel) ? 1 : 0;
+    }
+    if (is_excluded[n] != 0) {
+      ++report.explained;
+    } else if (!is_current) {
+      remembered.push_back(static_cast<int>(n));
+    } else if (voxel.camera == number) {
+      shown.push_back(static_cast<int>(n));
+    }
+  }
+  View& view = views[number];
+  controller.set_obstacles(balls(voxels, remembered), {memory_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
+  if (shown.empty() && std::exchange(view.had_obstacles, false)) {
+    controller.remove_obstacles(view.camera.name);  // the image shows that there is nothing: no need to wait for more
+  }
+  view.had_obstacles = view.had_obstacles || !shown.empty();
+  controller.set_obstacles(balls(voxels, shown), {view.camera.name, time, settings.valid_for});
+  report.seen = static_cast<int>(shown.size());
+  report.remembered = static_cast<int>(remembered.size());
+  report.unseen = static_cast<int>(border.cols());
+}
+
+bool Perception::Impl::drop_region(const std::string& name) {
+  const auto found = std::find_if(regions.begin(), regions.end(), [&](const Region& region) { return region.name == name; });
+  if (found == regions.end()) {
+    return false;
+  }
+  regions.erase(found);
+  return true;
+}
+
+std::vector<Perception::Cell> Perception::Impl::cells() const {
+  double newest = -std::numeric_limits<double>::infinity();
+  for (const View& view : views) {
+    newest = std::isnan(view.time) ? newest : std::max(newest, view.time);
+  }
+  std::vector<Cell> all;
+  for (std::size_t n = 0; n < is_excluded.size(); ++n) {
+    const Voxel& voxel = map.voxels()[n];
+    if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0) {
+      all.push_back({centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, !is_shown(voxel), voxel.is_hidden});
+    }
+  }
+  return all;
+}
+
+std::vector<PixelLabel> Perception::Impl::labels(const View& view) const {
+  std::vector<PixelLabel> labels(view.image.labels(), view.image.labels() + view.image.size());
+  const Eigen::Matrix3f R = view.X_WC.linear().cast<float>();
+  const Eigen::Vector3f t = view.X_WC.translation().cast<float>();
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (labels[i] == PixelLabel::obstacle) {
+      const float z = view.image.depth()[i];
+      const Eigen::Vector3f p = R * Eigen::Vector3f(view.rays.x()[i] * z, view.rays.y()[i] * z, z) + t;
+      const int voxel = map.voxel_of(p.data());
+      if (voxel >= 0 && static_cast<std::size_t>(voxel) < tested.size() && is_excluded[static_cast<std::size_t>(voxel)] != 0) {
+        labels[i] = tested[static_cast<std::size_t>(voxel)].is_explained ? PixelLabel::explained : PixelLabel::left_out;
+      }
+    }
+  }
+  return labels;
+}
+
+}  // namespace sidestep

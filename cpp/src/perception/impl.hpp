@@ -1,0 +1,83 @@
+#pragma once
+
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sidestep/perception/perception.hpp"
+#include "sidestep/perception/unseen_space.hpp"
+
+namespace sidestep {
+
+inline constexpr std::size_t most_cameras = 16;
+
+struct Perception::Impl {
+  /// A camera with its last image.
+  struct View {
+    View(const DepthCamera& its, const Arm& arm);
+
+    DepthCamera camera;
+    CameraRays rays;
+    DepthImage image;
+    ArmMask mask;
+    int frame_of_arm;  // Frame on which the camera is; -1: the world.
+    Eigen::Isometry3d X_WC;
+    double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
+    double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
+    double through = 0.0;     // share of rays that see through the arm, smoothed
+    std::uint32_t frame = 0;  // Number of the last image in the map.
+    bool had_obstacles = false;
+  };
+  struct Region {
+    std::string name;
+    Obstacles balls;
+    double grow;
+    int frame;  // of the arm; -1: the world
+  };
+  /// A voxel as it was when it was compared with told shapes.
+  struct Tested {
+    float low[3], high[3];
+    std::uint64_t version = 0;
+    int cell = -1;
+    bool is_explained = false;
+  };
+
+  Impl(Controller& controller, const std::vector<DepthCamera>& cameras, const PerceptionSettings& settings);
+
+  std::size_t index(const std::string& camera) const;
+  template <class Take>
+  PerceptionReport update(std::size_t number, double time, const Eigen::VectorXd& q, Take&& take);
+  /// Takes over the arm of the controller, with what it holds.
+  void refresh_arm();
+  bool find_arm(const View& view, double time, const Eigen::VectorXd& q, PerceptionReport& report);
+  Eigen::Isometry3d pose_of(const View& view) const;
+  void add_unseen(const SeenImage& seen);
+  void judge(View& view, PerceptionReport& report) const;
+  /// Gives the controller what the camera shows, and what no camera shows now.
+  void hand_over(std::size_t number, double time, PerceptionReport& report);
+  bool is_explained(std::size_t voxel, const Obstacles* told);
+  bool is_left_out(const Voxel& voxel) const;
+  bool is_shown(const Voxel& voxel) const noexcept { return voxel.frame == views[voxel.camera].frame; }
+  bool drop_region(const std::string& name);
+  std::vector<Cell> cells() const;
+  std::vector<PixelLabel> labels(const View& view) const;
+
+  Controller& controller;
+  const PerceptionSettings& settings;
+  mutable std::mutex mutex;
+  std::optional<Arm> arm;
+  std::vector<View> views;
+  Eigen::VectorXd zero;
+  KinematicState before, now, after;
+  VoxelMap map;
+  std::optional<UnseenSpace> unseen;
+  double unseen_time = -std::numeric_limits<double>::infinity();  // Time at which its border was found [s].
+  Eigen::Matrix3Xd border{3, 0};
+  std::vector<Region> regions;
+  std::vector<Tested> tested;      // one per voxel
+  std::vector<char> is_excluded;   // Per voxel: explained or left out.
+};
+
+}  // namespace sidestep

@@ -1,0 +1,222 @@
+#include "sidestep/perception/perception.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double least_valid_share = 0.01;  // Share of pixels with a depth, below which an image shows nothing at all.
+constexpr double smoothing_time = 0.5;      // Time constant of the share of rays that see through the arm [s].
+constexpr double through_share_at_most = 0.25;  // The same, above which the arm is not where it should be.
+constexpr int least_rays = 200;                 // Rays through the arm from which on it can be told.
+constexpr double future = 0.5;  // Time by which an image may be newer than the last step before that is worth a word [s].
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point& mark) noexcept {
+  const Clock::time_point now = Clock::now();
+  return std::chrono::duration<double>(now - std::exchange(mark, now)).count();
+}
+
+/// Share of the pixels that show something.
+double valid_share(const DepthImage& image) noexcept {
+  const auto nothing = std::count(image.labels(), image.labels() + image.size(), PixelLabel::nothing);
+  return 1.0 - static_cast<double>(nothing) / static_cast<double>(image.size());
+}
+
+}  // namespace
+
+Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras, const PerceptionSettings& settings)
+    : cameras_(std::move(cameras)), settings_(settings) {
+  settings_.validate();
+  if (cameras_.empty() || cameras_.size() > most_cameras) {
+    throw std::invalid_argument("perception: there are " + std::to_string(cameras_.size()) + " cameras, allowed: 1 to " +
+                                std::to_string(most_cameras));
+  }
+  for (std::size_t n = 0; n < cameras_.size(); ++n) {
+    const DepthCamera& camera = cameras_[n];
+    camera.validate();
+    if (camera.name == memory_source || camera.name == unseen_source || camera.name == SourceOptions::scene) {
+      throw std::invalid_argument("camera '" + camera.name + "': the name is that of a source, allowed: others than 'memory', 'unseen' and 'scene'");
+    }
+    for (std::size_t m = 0; m < n; ++m) {
+      if (cameras_[m].name == camera.name) {
+        throw std::invalid_argument("perception: two cameras have the name '" + camera.name + "', allowed: a name each");
+      }
+    }
+  }
+  impl_ = std::make_unique<Impl>(controller, cameras_, settings_);
+}
+Perception::~Perception() = default;
+
+PerceptionReport Perception::update(const std::string& camera, const RawDepth& depth, double time, const Eigen::VectorXd& q) {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->update(impl_->index(camera), time, q, [&](const DepthCamera& its, DepthImage& image) { image.take(its, depth); });
+}
+
+PerceptionReport Perception::update(const std::string& camera, const Eigen::Matrix3Xd& points, double time, const Eigen::VectorXd& q) {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->update(impl_->index(camera), time, q, [&](const DepthCamera& its, DepthImage& image) { image.take(its, points); });
+}
+
+template <class Take>
+PerceptionReport Perception::Impl::update(std::size_t number, double time, const Eigen::VectorXd& q, Take&& take) {
+  View& view = views[number];
+  if (!std::isfinite(time)) {
+    throw std::invalid_argument("camera '" + view.camera.name + "': time is " + std::to_string(time) +
+                                ", allowed: seconds on the clock of step, when the image was captured");
+  }
+  PerceptionReport report;
+  refresh_arm();
+  if (!find_arm(view, time, q, report)) {
+    return report;
+  }
+  Clock::time_point mark = Clock::now();
+  take(view.camera, view.image);
+  report.depth_time = since(mark);
+  if (valid_share(view.image) < least_valid_share) {
+    report.question = "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
+    return report;
+  }
+  const Eigen::Isometry3d X_WC = pose_of(view);
+  view.mask.mark(view.camera, view.rays, X_WC, {&before, &now, &after}, view.image);
+  report.mask_time = since(mark);
+  const SeenImage seen{view.camera, view.rays, X_WC, view.image, view.mask.front(), static_cast<std::uint8_t>(number), time};
+  map.add(seen);
+  report.map_time = since(mark);
+  if (unseen) {
+    add_unseen(seen);
+  }
+  report.unseen_time = since(mark);
+  view.X_WC = X_WC;
+  view.time = time;
+  view.frame = map.frame();
+  judge(view, report);
+  hand_over(number, time, report);
+  report.obstacles_time = since(mark);
+  report.used = true;
+  return report;
+}
+
+bool Perception::Impl::find_arm(const View& view, double time, const Eigen::VectorXd& q, PerceptionReport& report) {
+  const Robot& robot = arm->robot();
+  if (q.size() != 0) {
+    if (q.size() != robot.num_coordinates() || !q.allFinite()) {
+      throw std::invalid_argument("perception: q has " + std::to_string(q.size()) + " entries, allowed: " +
+                                  std::to_string(robot.num_coordinates()) + ", all finite");
+    }
+    for (KinematicState* const state : {&before, &now, &after}) {
+      state->update(robot, q, zero);
+    }
+    return true;
+  }
+  const StateHistory& history = controller.history();
+  const double last = history.last_time(), error = view.camera.clock_error;
+  Eigen::VectorXd at(zero.size()), earlier(zero.size()), later(zero.size());
+  if (!history.at(time, at)) {
+    report.question = "camera '" + view.camera.name + "': nobody knows where the arm was at " + std::to_string(time) +
+                      " s; the clock of step " + (std::isnan(last) ? "has not begun" : "is at " + std::to_string(last) + " s") +
+                      ", and it remembers the last " + std::to_string(StateHistory::capacity) + " steps";
+    return false;
+  }
+  if (time > last + future) {
+    report.question = "camera '" + view.camera.name + "': its image was captured at " + std::to_string(time) +
+                      " s, later than the last step at " + std::to_string(last) + " s: give both the same clock";
+    return false;
+  }
+  if (!history.at(time - error, earlier)) {
+    earlier = at;
+  }
+  history.at(time + error, later);
+  if (time + error > last) {  // after the last step the arm goes on as before
+    later = at + (at - earlier);
+  }
+  before.update(robot, earlier, zero);
+  now.update(robot, at, zero);
+  after.update(robot, later, zero);
+  return true;
+}
+
+void Perception::Impl::judge(View& view, PerceptionReport& report) const {
+  report.arm = view.mask.residual();
+  if (report.arm.rays >= least_rays) {
+    const double share = std::isnan(view.judged) ? 1.0 : 1.0 - std::exp(-std::max(0.0, view.time - view.judged) / smoothing_time);
+    view.through += share * (report.arm.through_share() - view.through);
+    view.judged = view.time;
+  }
+  report.through = view.through;
+  if (view.through > through_share_at_most) {
+    report.question = "camera '" + view.camera.name + "': the arm is not where q says, " +
+                      std::to_string(static_cast<int>(std::lround(100.0 * view.through))) +
+                      " % of the rays that should meet it pass; check the camera's pose and the times of its images (sidestep camera check)";
+  }
+  for (std::size_t i = 0; i < view.image.size(); ++i) {
+    const PixelLabel label = view.image.labels()[i];
+    report.obstacle_pixels += label == PixelLabel::obstacle ? 1 : 0;
+    report.arm_pixels += label == PixelLabel::arm ? 1 : 0;
+    report.edge_pixels += label == PixelLabel::edge ? 1 : 0;
+  }
+}
+
+void Perception::leave_out(const std::string& name, const Obstacles& region, double grow, const std::string& link) {
+  const std::lock_guard lock(impl_->mutex);
+  if (name.empty() || region.size() == 0 || !(grow >= 0.0 && grow <= 1.0)) {
+    throw std::invalid_argument("leave_out: the name is '" + name + "', the region has " + std::to_string(region.size()) + " balls, grow is " +
+                                std::to_string(grow) + " m, allowed: a name, at least one ball, 0 to 1 m");
+  }
+  const int frame = link.empty() ? -1 : impl_->arm->robot().frame_index(link);
+  impl_->drop_region(name);
+  impl_->regions.push_back({name, region, grow, frame});
+}
+
+void Perception::take_in(const std::string& name) {
+  const std::lock_guard lock(impl_->mutex);
+  if (!impl_->drop_region(name)) {
+    std::string names;
+    for (const auto& region : impl_->regions) {
+      names += (names.empty() ? "'" : ", '") + region.name + "'";
+    }
+    throw std::invalid_argument("take_in: there is no region '" + name + "', there " + (names.empty() ? "is none" : "are: " + names));
+  }
+}
+
+void Perception::forget() {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->map.clear();
+  impl_->tested.clear();
+}
+
+Eigen::Isometry3d Perception::pose(const std::string& camera) const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->views[impl_->index(camera)].X_WC;
+}
+std::vector<float> Perception::depth(const std::string& camera) const {
+  const std::lock_guard lock(impl_->mutex);
+  const DepthImage& image = impl_->views[impl_->index(camera)].image;
+  return {image.depth(), image.depth() + image.size()};
+}
+std::vector<PixelLabel> Perception::labels(const std::string& camera) const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->labels(impl_->views[impl_->index(camera)]);
+}
+double Perception::time(const std::string& camera) const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->views[impl_->index(camera)].time;
+}
+std::vector<Perception::Cell> Perception::cells() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->cells();
+}
+Eigen::Matrix3Xd Perception::unseen() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->border;
+}
+
+}  // namespace sidestep
