@@ -193,6 +193,26 @@ def test_links_without_visual_meshes_are_seen_by_their_collision_parts(visuals: 
     assert image.depth[60, 80] == pytest.approx(0.95, abs=1e-3)  # the bob's sphere of 50 mm in triangles
 
 
+def test_links_look_as_chosen() -> None:
+    robot = Robot.named("fr3")
+    model = build_model(robot)
+    data = mujoco.MjData(model.model)
+    model.set_state(data, 0.5 * (robot.limits.lower + robot.limits.upper), np.zeros(robot.num_coordinates))
+    pinhole = Pinhole(pose=look_at((1.3, 0.5, 0.8), (0.2, 0.0, 0.4)))
+    role = {
+        links: _camera(model, pinhole, links=links).capture(data, 0.0) for links in ("visual", "collision")
+    }
+    for links, image in role.items():
+        shown = {
+            model.model.geom(int(geom)).name.split(":")[0] for geom in np.unique(image.geom[image.geom >= 0])
+        }
+        assert shown == {links}
+    seen = {links: image.owner == 1 for links, image in role.items()}
+    # convex parts hold nearly all of the visual meshes, and some more
+    assert (seen["visual"] & ~seen["collision"]).sum() < 0.02 * seen["visual"].sum()
+    assert 1.0 < seen["collision"].sum() / seen["visual"].sum() < 1.15
+
+
 def test_range_limits_what_is_measured_and_not_the_truth() -> None:
     model = _ball_model()
     data = mujoco.MjData(model.model)
@@ -282,6 +302,7 @@ def test_noise_leaves_the_truth_alone() -> None:
         (Pinhole(cx=float("nan")), {}, "cx, cy are nan"),
         (Pinhole(), {"latency": -0.1}, "latency is -0.1 s"),
         (Pinhole(), {"lost": 1.5}, "lost is 1.5"),
+        (Pinhole(), {"links": "hull"}, "links is 'hull', allowed: visual, collision"),
         (Pinhole(), {"noise": "lidar"}, "noise is 'lidar', allowed: none, d435"),
         (Pinhole(pose=2.0 * np.eye(4)), {}, "'front': pose is not a rigid transform"),
     ],

@@ -16,7 +16,7 @@ from sidestep.math.matrices import product
 from sidestep.math.pose import checked_pose
 from sidestep.math.pose import look_at as look_at
 from sidestep.simulation.depth_noise import DepthNoiseModel, noise_model
-from sidestep.simulation.depth_renderer import DepthRenderer
+from sidestep.simulation.depth_renderer import DepthRenderer, LinkSurface
 from sidestep.simulation.model import SimulationModel
 
 Array = npt.NDArray[np.float64]
@@ -100,6 +100,8 @@ class SimulatedCamera:
         latency: from the capture to the delivery [s].
         lost: share of images in [0, 1] that never arrive.
         seed: of the noise and of what is lost.
+        links: "visual": links look like their visual meshes, those without any like their collision parts;
+            "collision": like their convex collision parts, which are drawn ten times as fast.
 
     Raises:
         ValueError: a distortion model other than "none", an unknown noise or link, or a value outside its range.
@@ -115,6 +117,7 @@ class SimulatedCamera:
         latency: float = 0.0,
         lost: float = 0.0,
         seed: int = 0,
+        links: LinkSurface = "visual",
     ) -> None:
         _check(model, camera, latency, lost)
         self.camera, self.latency, self.lost, self.seed = camera, float(latency), float(lost), seed
@@ -130,6 +133,7 @@ class SimulatedCamera:
             size=(camera.width, camera.height),
             focal=(camera.fx, camera.fy),
             centre=(camera.cx, camera.cy),
+            links=links,
         )
 
     def capture(
