@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -337,6 +338,10 @@ def test_the_model_is_left_as_it_was() -> None:
     assert model.model.vis.global_.offwidth == before[1]
 
 
+def _small(model: SimulationModel) -> DepthRenderer:
+    return DepthRenderer(model, size=(16, 12), focal=(10.0, 10.0), centre=(8.0, 6.0))
+
+
 def test_without_opengl_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     egl = pytest.importorskip("mujoco.egl", reason="no EGL", exc_type=Exception)
 
@@ -346,8 +351,17 @@ def test_without_opengl_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("MUJOCO_GL", "egl")
     monkeypatch.setattr(egl, "GLContext", refuses)
     with pytest.raises(RuntimeError, match="libegl1 and libgl1-mesa-dri") as caught:
-        DepthRenderer(_ball_model(), size=(16, 12), focal=(10.0, 10.0), centre=(8.0, 6.0))
+        _small(_ball_model())
     assert "Cannot initialize" in str(caught.value)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere windows need no DISPLAY")
+def test_a_window_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    with pytest.raises(RuntimeError, match=r"MUJOCO_GL is 'glfw' and there is no display.*set MUJOCO_GL=egl"):
+        _small(_ball_model())
 
 
 def test_a_frame_that_is_not_there_is_named() -> None:

@@ -21,10 +21,8 @@ Depth = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int32]
 LinkSurface = Literal["visual", "collision"]
 
-NEAREST, FARTHEST = (
-    np.float32(5e-3),
-    np.float32(99.0),
-)  # [m] clipping planes; objects that are not there wait 100 m away
+# Clipping planes [m]. Objects that are not there wait 100 m away.
+NEAREST, FARTHEST = np.float32(5e-3), np.float32(99.0)
 # Coefficients of z = B / (buffer + A), rounded as OpenGL's projection matrix has them: A is a small difference.
 A = np.float32(0.5) * ((FARTHEST + NEAREST) / (FARTHEST - NEAREST)) - np.float32(0.5)
 B = FARTHEST * NEAREST / (FARTHEST - NEAREST)
@@ -165,15 +163,17 @@ def _drawn_model(built: SimulationModel, width: int, height: int, links: LinkSur
 
 
 def _start_opengl(width: int, height: int) -> Any:
-    """OpenGL's context without a window: by EGL on Linux without a display, else MuJoCo's choice."""
-    unset = not os.environ.get("MUJOCO_GL")
+    """OpenGL's context without a window: on Linux by EGL, unless MUJOCO_GL is set; else MuJoCo's choice."""
     headless = sys.platform == "linux" and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
-    if unset and headless:
+    if headless and not os.environ.get("MUJOCO_GL"):
         os.environ["MUJOCO_GL"] = "egl"  # MuJoCo's library reads it as well
+    choice = os.environ.get("MUJOCO_GL", "").lower() or ("egl" if sys.platform == "linux" else "")
     try:
-        if os.environ.get("MUJOCO_GL", "").lower() == "egl":  # also where MuJoCo chose before this was set
+        if headless and choice not in ("egl", "osmesa"):  # MuJoCo would end the process
+            raise OSError(f"MUJOCO_GL is {choice!r} and there is no display")
+        if choice == "egl":  # also where `import mujoco` has chosen another before
             from mujoco.egl import GLContext
         else:
             from mujoco.gl_context import GLContext
