@@ -8,6 +8,7 @@ from sidestep.math.pose import (
     about_axis,
     checked_pose,
     from_roll_pitch_yaw,
+    look_at,
     moved,
     pose_at,
     pose_matrix,
@@ -123,3 +124,43 @@ def test_what_is_no_turn_is_named(given: dict[str, object], words: str) -> None:
 def test_what_is_no_translation_is_named() -> None:
     with pytest.raises(ValueError, match=r"translation has shape \(2,\), expected \(3,\)"):
         pose_at([0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("eye", "target"),
+    [
+        ((1.5, 0.4, 0.9), (0.2, -0.1, 0.3)),
+        ((0.0, 0.0, 2.0), (0.0, 0.0, 0.0)),
+        ((0.1, 0.2, 0.0), (0.1, 0.2, 3.0)),
+    ],
+)
+def test_a_camera_looks_at_its_target(eye: tuple[float, ...], target: tuple[float, ...]) -> None:
+    X_WC = look_at(eye, target)
+    R = X_WC[:3, :3]
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-12)
+    seen = R.T @ (np.array(target) - X_WC[:3, 3])
+    distance = np.linalg.norm(np.subtract(target, eye))
+    np.testing.assert_allclose(seen, [0.0, 0.0, distance], atol=1e-12)  # on the optical axis
+    assert R[2, 0] == pytest.approx(0.0, abs=1e-12)  # the horizon is level
+    assert R[2, 1] <= 1e-12  # y points down
+
+
+def test_up_turns_the_image() -> None:
+    # looks along the world's x with its y axis up: right is then up in the world
+    np.testing.assert_allclose(
+        look_at((0, 0, 0), (1, 0, 0), up=(0, 2, 0))[:3, :3].T, [[0, 0, 1], [0, -1, 0], [1, 0, 0]], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (((0, 0, 0), (0, 0, 0)), "two points apart"),
+        (((0, 0, float("inf")), (0, 0, 0)), "finite numbers"),
+        (((0, 0), (0, 0, 0)), r"look_at: eye has shape \(2,\)"),
+    ],
+)
+def test_a_view_that_is_none_is_refused(arguments: tuple, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        look_at(*arguments)

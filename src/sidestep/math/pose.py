@@ -18,6 +18,7 @@ ROUNDED = (
     0.01  # largest entry of |R Rᵀ - 1| that counts as rounding: a quaternion of three digits has up to 0.008
 )
 NO_TURN = 1e-9  # sine of an angle that is none, or half a turn
+ALONG = 1e-6  # sine of the angle to a direction that is along it
 ROUNDED_NORM = 0.01  # from 1: four entries of a quaternion that are rounded to two digits
 
 
@@ -99,11 +100,42 @@ def pose_at(
     return X
 
 
-def _shaped(value: npt.ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, *, up: npt.ArrayLike = (0.0, 0.0, 1.0)) -> Array:
+    """The pose X_WC (4, 4) of a camera's optical frame (x right, y down, z forward) at `eye` that looks at `target`.
+
+    Args:
+        eye, target: (3,) in the world [m].
+        up: (3,) direction in the world that is up in the image. Where the camera looks along it, the world's y axis
+            is up, or its x axis.
+
+    Raises:
+        ValueError: a shape is another, an entry is not finite, the points are one, or `up` is 0.
+    """
+    start, end, upward = (
+        _shaped(value, name, (3,), owner="look_at")
+        for value, name in ((eye, "eye"), (target, "target"), (up, "up"))
+    )
+    forward = end - start
+    distance, length = float(np.linalg.norm(forward)), float(np.linalg.norm(upward))
+    if not (math.isfinite(distance + length) and distance > 0.0 and length > 0.0):
+        raise ValueError(
+            f"look_at: eye {start.tolist()}, target {end.tolist()}, up {upward.tolist()}: allowed are finite numbers, "
+            "two points apart from each other, and a direction that is not 0"
+        )
+    z = forward / distance
+    for candidate in (upward / length, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
+        x = np.cross(z, candidate)
+        if np.linalg.norm(x) > ALONG:
+            break
+    x /= np.linalg.norm(x)
+    return pose_at(start, np.column_stack([x, np.cross(z, x), z]))
+
+
+def _shaped(value: npt.ArrayLike, name: str, shape: tuple[int, ...], *, owner: str = "pose_at") -> Array:
     array: Array = real_array(value, name)
     if array.shape == shape:
         return array
-    words = f"pose_at: {name} has shape {array.shape}, expected {shape}"
+    words = f"{owner}: {name} has shape {array.shape}, expected {shape}"
     if name == "rotation" and array.shape == (4,):
         words += (
             "; state the order of a quaternion: xyzw=q as of ROS and SciPy, or wxyz=q as of MuJoCo and Drake"

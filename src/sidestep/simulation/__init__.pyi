@@ -6,6 +6,15 @@ from .adapter import Driver as Driver
 from .adapter import KinematicAdapter as KinematicAdapter
 from .adapter import KinematicDriver as KinematicDriver
 from .adapter import StepRecord as StepRecord
+from .depth_camera import CameraGeometry as CameraGeometry
+from .depth_camera import SimulatedCamera as SimulatedCamera
+from .depth_camera import SimulatedImage as SimulatedImage
+from .depth_camera import look_at as look_at
+from .depth_noise import D435 as D435
+from .depth_noise import DepthNoiseModel as DepthNoiseModel
+from .depth_noise import Kinect as Kinect
+from .depth_noise import NoNoise as NoNoise
+from .depth_noise import StructuredLight as StructuredLight
 from .evaluation import Evaluation as Evaluation
 from .evaluation import LimitViolations as LimitViolations
 from .evaluation import evaluate as evaluate
@@ -18,3 +27,4 @@ from .run import KinematicRun as KinematicRun
 from .run import Run as Run
 from .run import SimulationRun as SimulationRun
 from .simulation import Simulation as Simulation
+from .triangulation_noise import TriangulationNoise as TriangulationNoise

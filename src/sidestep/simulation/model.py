@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.distance.scene import Scene, SceneObject, check_scene
+from sidestep.math.matrices import product
+from sidestep.math.pose import pose_at
 from sidestep.robot import Robot
 from sidestep.simulation.arm_model import add_robot, leader
 from sidestep.simulation.contacts import SCENE_BIT
@@ -34,6 +36,7 @@ class SimulationModel:
         actuators: (nv,) index of each coordinate's torque actuator.
         geom_owner: geom index to ("link" | "object" | "floor", name).
         object_bodies: body index of each scene object.
+        link_frames: frame name to its body index and its pose (4, 4) in that body.
     """
 
     model: mujoco.MjModel
@@ -45,6 +48,7 @@ class SimulationModel:
     actuators: npt.NDArray[np.intp]
     geom_owner: dict[int, tuple[str, str]]
     object_bodies: tuple[int, ...]
+    link_frames: dict[str, tuple[int, Array]]
 
     def state(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Coordinates q and v (nv,) of the robot."""
@@ -55,6 +59,18 @@ class SimulationModel:
         """Puts the robot, mimic joints included, at (q, v)."""
         data.qpos[self.joint_positions] = self.coordinate @ q + self.offset
         data.qvel[self.joint_velocities] = self.coordinate @ v
+
+    def link_pose(self, data: mujoco.MjData, link: str) -> Array:
+        """X_WL (4, 4) of a link or another frame of the robot, after the forward kinematics of `data`.
+
+        Raises:
+            ValueError: the robot has no such frame; names those that it has.
+        """
+        if link not in self.link_frames:
+            raise ValueError(f"no frame {link!r} on this robot, allowed: {', '.join(self.link_frames)}")
+        body, X_BL = self.link_frames[link]
+        X_WB = pose_at(data.xpos[body], data.xmat[body].reshape(3, 3))
+        return product(X_WB, X_BL)
 
     def mass_matrix(self, data: mujoco.MjData) -> Array:
         """M (nv, nv) in the robot's coordinates, after the forward kinematics of `data`."""
@@ -165,6 +181,9 @@ def _locate(
     model: mujoco.MjModel, robot: Robot, scene: tuple[SceneObject, ...], owners: dict[str, tuple[str, str]]
 ) -> SimulationModel:
     joints = [model.joint(joint.name) for joint in robot.joints]
+    carriers = [model.body("robot_base").id] + [
+        model.body(f"joint:{joint.name}").id for joint in robot.joints
+    ]
     coordinate = np.zeros((len(joints), robot.num_coordinates))
     for row, joint in enumerate(robot.joints):
         coordinate[row, joint.coordinate] = joint.multiplier
@@ -178,4 +197,7 @@ def _locate(
         actuators=np.array([model.actuator(name).id for name in robot.coordinate_names], dtype=np.intp),
         geom_owner={model.geom(name).id: owner for name, owner in owners.items()},
         object_bodies=tuple(int(model.body(f"object:{item.name}").id) for item in scene),
+        link_frames={
+            frame.name: (int(carriers[frame.joint + 1]), np.array(frame.placement)) for frame in robot.frames
+        },
     )
