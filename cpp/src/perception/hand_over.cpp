@@ -182,7 +182,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
   std::vector<int> shown, remembered;
   for (std::size_t n = 0; n < voxels.size(); ++n) {
     const Voxel& voxel = voxels[n];
-    if (voxel.cell < 0 || !voxel.counts) {
+    if (voxel.cell < 0 || !voxel.counts || map.is_background(voxel)) {
       continue;
     }
     const bool is_current = is_shown(voxel);

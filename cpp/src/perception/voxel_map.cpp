@@ -34,6 +34,11 @@ void VoxelMap::clear() noexcept {
 void VoxelMap::add(const SeenImage& seen) {
   ++frame_;
   touched_.clear();
+  const auto width = static_cast<std::size_t>(seen.image.width());
+  for (std::vector<float>* const coordinate : {&row_x_, &row_y_, &row_z_}) {
+    coordinate->resize(width);
+  }
+  row_cells_.resize(width);
   add_points(seen);
   for (const int index : touched_) {
     end_frame(voxels_[static_cast<std::size_t>(index)], seen);
@@ -77,33 +82,48 @@ void VoxelMap::begin_frame(Voxel& voxel, const SeenImage& seen) noexcept {
 void VoxelMap::add_points(const SeenImage& seen) {
   const Eigen::Matrix3f R = seen.X_WC.linear().cast<float>();
   const Eigen::Vector3f t = seen.X_WC.translation().cast<float>();
-  const float *x = seen.rays.x(), *y = seen.rays.y(), *z = seen.image.depth();
-  const PixelLabel* const labels = seen.image.labels();
+  const int width = seen.image.width();
+  num_outside_ = 0;
+  for (int v = 0; v < seen.image.height(); ++v) {
+    const auto row = static_cast<std::ptrdiff_t>(v) * width;
+    const float* __restrict__ const ray_x = seen.rays.x() + row;
+    const float* __restrict__ const ray_y = seen.rays.y() + row;
+    const float* __restrict__ const depth = seen.image.depth() + row;
+    float* __restrict__ const x = row_x_.data();
+    float* __restrict__ const y = row_y_.data();
+    float* __restrict__ const z = row_z_.data();
+    for (int u = 0; u < width; ++u) {
+      const float a = ray_x[u] * depth[u], b = ray_y[u] * depth[u], c = depth[u];
+      x[u] = R(0, 0) * a + R(0, 1) * b + R(0, 2) * c + t[0];
+      y[u] = R(1, 0) * a + R(1, 1) * b + R(1, 2) * c + t[1];
+      z[u] = R(2, 0) * a + R(2, 1) * b + R(2, 2) * c + t[2];
+    }
+    grid_.cells(x, y, z, width, row_cells_.data());
+    add_row(seen, seen.image.labels() + row);
+  }
+}
+
+void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
   int last_cell = -1;
   Voxel* voxel = nullptr;
-  num_outside_ = 0;
-  for (std::size_t i = 0; i < seen.image.size(); ++i) {
-    if (labels[i] != PixelLabel::obstacle) {
+  for (std::size_t u = 0; u < row_cells_.size(); ++u) {
+    const int cell = row_cells_[u];
+    if (labels[u] != PixelLabel::obstacle) {
       continue;
-    }
-    const float depth = z[i], a = x[i] * depth, b = y[i] * depth;
-    const float p[3] = {R(0, 0) * a + R(0, 1) * b + R(0, 2) * depth + t[0], R(1, 0) * a + R(1, 1) * b + R(1, 2) * depth + t[1],
-                        R(2, 0) * a + R(2, 1) * b + R(2, 2) * depth + t[2]};
-    const int cell = grid_.cell(p);
-    if (cell != last_cell) {
-      last_cell = cell;
-      if (cell >= 0) {
-        voxel = &voxel_at(cell, seen.time);
-        if (voxel->frame != frame_) {
-          begin_frame(*voxel, seen);
-        }
-      }
     }
     if (cell < 0) {
       ++num_outside_;
       continue;
     }
+    if (cell != last_cell) {
+      last_cell = cell;
+      voxel = &voxel_at(cell, seen.time);
+      if (voxel->frame != frame_) {
+        begin_frame(*voxel, seen);
+      }
+    }
     ++voxel->pixels;
+    const float p[3] = {row_x_[u], row_y_[u], row_z_[u]};
     for (int axis = 0; axis < 3; ++axis) {
       voxel->frame_low[axis] = std::min(voxel->frame_low[axis], p[axis]);
       voxel->frame_high[axis] = std::max(voxel->frame_high[axis], p[axis]);

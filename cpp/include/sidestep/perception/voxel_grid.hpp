@@ -30,6 +30,8 @@ class VoxelGrid {
     }
     return -1;
   }
+  /// The same of `count` points, as structure of arrays; rounding may put points on the border of two cells into the other one.
+  void cells(const float* x, const float* y, const float* z, int count, int* cells) const noexcept;
   int num_cells() const noexcept { return num_cells_; }
   /// Level of a cell, and the edge of its cells [m].
   int level(int cell) const noexcept { return cell >= levels_[2].begin ? 2 : cell >= levels_[1].begin ? 1 : 0; }

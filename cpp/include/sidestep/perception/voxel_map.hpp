@@ -52,6 +52,8 @@ struct SeenImage {
 /// arm is, or nothing was seen, it is hidden, and kept for `memory`.
 class VoxelMap {
  public:
+  static constexpr double background_after = 1.0;  ///< Time for which a voxel must have been seen to be background [s].
+
   VoxelMap(const Eigen::Vector3d& centre, double reach, const PerceptionSettings& settings);
 
   /// Adds an image. May allocate while the number of voxels grows.
@@ -64,6 +66,10 @@ class VoxelMap {
     const int cell = grid_.cell(p);
     return cell < 0 ? -1 : index_[static_cast<std::size_t>(cell)];
   }
+  /// Whether a voxel is beyond what is as fine as `voxel`, and has been seen for so long that it rests: nothing to an arm that is out of reach.
+  bool is_background(const Voxel& voxel) const noexcept {
+    return grid_.level(voxel.cell) > 0 && voxel.last - voxel.first > background_after;
+  }
   double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
   const VoxelGrid& grid() const noexcept { return grid_; }
   /// Number of points of the last image that were too far away.
@@ -74,6 +80,7 @@ class VoxelMap {
 
  private:
   void add_points(const SeenImage& seen);
+  void add_row(const SeenImage& seen, const PixelLabel* labels);
   Voxel& voxel_at(int cell, double time);
   void begin_frame(Voxel& voxel, const SeenImage& seen) noexcept;
   void end_frame(Voxel& voxel, const SeenImage& seen) noexcept;
@@ -89,6 +96,8 @@ class VoxelMap {
   std::vector<Voxel> voxels_;
   std::vector<int> unused_;   // Indices of voxels that are not in use.
   std::vector<int> touched_;  // Indices of those that the image showed.
+  std::vector<float> row_x_, row_y_, row_z_;  // Points of a row of pixels [m], in the world.
+  std::vector<int> row_cells_;                // Their cells.
   std::uint32_t frame_ = 0;
   int num_outside_ = 0;
 };
