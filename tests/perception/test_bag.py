@@ -157,8 +157,8 @@ def test_compressed_depth_is_read(bag: Bag) -> None:
     # Depth in float as its quantised inverse: value = A / depth + B, in whole numbers.
     metres = np.linspace(0.5, 4.0, 12).reshape(3, 4)
     A, B = 10100.0, 1.0 - 10100.0 / 10.0
-    values = np.floor(A / metres + B).astype(int) + 2000  # B shifted by as much, so that all are positive
-    header = struct.pack("<iff", 0, A, B + 2000)
+    values = np.floor(A / metres + B).astype(int)
+    header = struct.pack("<iff", 0, A, B)
     values[0, 0] = 0
     data = packed(values.astype(np.uint16), header)
     bag.add(topic, "CompressedImage", time=2.0, format="32FC1; compressedDepth png", data=data)
