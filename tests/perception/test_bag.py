@@ -241,6 +241,18 @@ def test_distortion_by_its_name_in_ros(
     )
 
 
+def test_rectified_images_have_the_intrinsics_p(bag: Bag) -> None:
+    P = np.array([5.0, 0.0, 2.5, 0.0, 0.0, 5.25, 2.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    for camera, name in (("a", "image_rect_raw"), ("b", "image_raw")):
+        bag.info(f"/{camera}/depth/camera_info", d=np.full(5, 0.1), p=P)
+        bag.image(f"/{camera}/depth/{name}", DEPTH)
+    bag.writer.close()
+    rectified, raw = BagRecording(bag.writer.path).cameras
+    assert (rectified.fx, rectified.fy, rectified.cx, rectified.cy) == (5.0, 5.25, 2.5, 2.0)
+    assert (rectified.distortion_model, raw.distortion_model) == ("none", "brown_conrady")
+    assert (raw.fx, raw.fy, raw.cx, raw.cy) == (4.0, 4.25, 1.5, 1.0)
+
+
 @pytest.mark.parametrize(
     ("changed", "words"),
     [

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-import numpy as np
 import numpy.typing as npt
 
-from sidestep.math.pose import pose_vector
-from sidestep.perception.bag import CAMERA_INFO, IMAGE, JOINT_STATE, TRANSFORMS
+from sidestep.perception.bag_topics import TRANSFORMS
 from sidestep.perception.camera_record import CameraRecord
 from sidestep.perception.frame import Frame
-from sidestep.perception.ros_message import MILLIMETRE
+from sidestep.perception.ros_maker import MODELS, RosMaker, stamp
 from sidestep.perception.written_cameras import by_name, camera_of, positions_of
 
 _VERSION: Literal[9] = 9  # of the bag's metadata: that of ROS 2 Jazzy
 _NAME = re.compile(r"[A-Za-z]\w*(?:/[A-Za-z]\w*)*", re.ASCII)  # what a topic may hold
-_MODELS = {"none": "plumb_bob", "brown_conrady": "plumb_bob", "kannala_brandt": "equidistant"}
 
 
 class BagWriter:
@@ -67,15 +63,15 @@ class BagWriter:
                 raise ValueError(
                     f"camera is called {camera.name!r}, a topic has letters, digits, _ and / alone"
                 )
-            if camera.distortion_model not in _MODELS:
+            if camera.distortion_model not in MODELS:
                 raise ValueError(
-                    f"camera '{camera.name}' has distortion {camera.distortion_model!r}, ROS has {', '.join(_MODELS)}"
+                    f"camera '{camera.name}' has distortion {camera.distortion_model!r}, ROS has {', '.join(MODELS)}"
                 )
         if self.path.exists():
             raise FileExistsError(f"bag '{self.path}' exists, nothing is overwritten")
         self.joint_names, self._base = tuple(joint_names), base
         self._store = get_typestore(Stores.ROS2_JAZZY)
-        self._types = self._store.types
+        self._make = RosMaker(self._store)
         plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
         self._writer = Writer(self.path, version=_VERSION, storage_plugin=plugin)
         self._writer.open()
@@ -90,23 +86,16 @@ class BagWriter:
         """
         camera = camera_of(frame, self._cameras)
         if not self._poses_written:
-            self._write_poses(frame.time)
-        whole = frame.depth.dtype == np.uint16 and frame.unit == MILLIMETRE
-        depth = np.ascontiguousarray(frame.depth if whole else frame.metres)
-        header = self._header(frame.time, _optical_frame(camera))
-        image = self._types[IMAGE](
-            header=header,
-            height=camera.height,
-            width=camera.width,
-            encoding="16UC1" if whole else "32FC1",
-            is_bigendian=0,
-            step=depth.strides[0],
-            data=depth.astype(depth.dtype.newbyteorder("<"), copy=False).view(np.uint8).ravel(),
+            poses = self._make.poses(list(self._cameras.values()), self._base, time=frame.time)
+            if poses.transforms:
+                self._write("/tf_static", poses, frame.time)
+            self._poses_written = True
+        self._write(
+            f"/{camera.name}/depth/camera_info", self._make.camera_info(camera, frame.time), frame.time
         )
-        self._write(f"/{camera.name}/depth/camera_info", self._info(camera, header), frame.time)
         if frame.q is not None and self.joint_names:
             self.add_state(frame.time, frame.q)
-        self._write(f"/{camera.name}/depth/image", image, frame.time)
+        self._write(f"/{camera.name}/depth/image", self._make.image(frame), frame.time)
 
     def add_state(self, time: float, q: npt.ArrayLike) -> None:
         """Writes joint positions q (n,) [rad or m] at a time [s].
@@ -115,14 +104,7 @@ class BagWriter:
             ValueError: q has another length or is not finite.
         """
         values = positions_of(q, self.joint_names)
-        message = self._types[JOINT_STATE](
-            header=self._header(time, ""),
-            name=list(self.joint_names),
-            position=values,
-            velocity=np.zeros(0),
-            effort=np.zeros(0),
-        )
-        self._write("/joint_states", message, time)
+        self._write("/joint_states", self._make.joint_state(self.joint_names, values, time=time), time)
 
     def __enter__(self) -> BagWriter:
         return self
@@ -143,70 +125,9 @@ class BagWriter:
             self._connections[topic] = self._writer.add_connection(
                 topic, kind, typestore=self._store, offered_qos_profiles=profiles
             )
-        sec, nanosec = _stamp(time)
+        sec, nanosec = stamp(time)
         content = self._store.serialize_cdr(message, kind)
         self._writer.write(self._connections[topic], sec * 1_000_000_000 + nanosec, content)
-
-    def _header(self, time: float, frame: str) -> Any:
-        sec, nanosec = _stamp(time)
-        stamp = self._types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
-        return self._types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
-
-    def _info(self, camera: CameraRecord, header: Any) -> Any:
-        K = np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
-        region = self._types["sensor_msgs/msg/RegionOfInterest"](
-            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
-        )
-        return self._types[CAMERA_INFO](
-            header=header,
-            height=camera.height,
-            width=camera.width,
-            distortion_model=_MODELS[camera.distortion_model],
-            d=camera.distortion[: 4 if camera.distortion_model == "kannala_brandt" else 5].copy(),
-            k=K.ravel(),
-            r=np.eye(3).ravel(),
-            p=np.hstack([K, np.zeros((3, 1))]).ravel(),
-            binning_x=0,
-            binning_y=0,
-            roi=region,
-        )
-
-    def _write_poses(self, time: float) -> None:
-        """The poses of the cameras at /tf_static."""
-        make = {
-            name: self._types[f"geometry_msgs/msg/{name}"] for name in ("Vector3", "Quaternion", "Transform")
-        }
-        transforms = []
-        for camera in self._cameras.values():
-            if camera.pose is not None:
-                x, y, z, qw, qx, qy, qz = pose_vector(camera.pose).tolist()
-                transform = make["Transform"](
-                    translation=make["Vector3"](x=x, y=y, z=z),
-                    rotation=make["Quaternion"](x=qx, y=qy, z=qz, w=qw),
-                )
-                transforms.append(
-                    self._types["geometry_msgs/msg/TransformStamped"](
-                        header=self._header(time, camera.link or self._base),
-                        child_frame_id=_optical_frame(camera),
-                        transform=transform,
-                    )
-                )
-        if transforms:
-            self._write("/tf_static", self._types[TRANSFORMS](transforms=transforms), time)
-        self._poses_written = True
-
-
-def _optical_frame(camera: CameraRecord) -> str:
-    return f"{camera.name}_depth_optical_frame"
-
-
-def _stamp(time: float) -> tuple[int, int]:
-    """Seconds and nanoseconds of a time [s], from its whole part on, so that times of this century keep their bits."""
-    if not 0.0 <= time < 2.0**31:
-        raise ValueError(f"time is {time} s, a bag has times from 0 to 2^31 s")
-    sec = math.floor(time)
-    nanosec = round((time - sec) * 1e9)
-    return (sec, nanosec) if nanosec < 1_000_000_000 else (sec + 1, 0)
 
 
 def _latched() -> Any:

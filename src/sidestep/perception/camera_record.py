@@ -26,7 +26,7 @@ class CameraRecord:
         distortion: (5,): k1, k2, p1, p2, k3 of the Brown-Conrady models, k1 to k4 and 0 of Kannala-Brandt.
         pose: pose (4, 4) of the optical frame (x right, y down, z forward) in the world, or in `link`; None: not known.
         link: the link of the arm that carries the camera; "" for a camera that stands in the world.
-        unit: metres of one step of its uint16 images; 1 for images in metres.
+        unit: metres of one step of its images of uint16.
 
     Raises:
         ValueError: a value is not as said; the message names it.

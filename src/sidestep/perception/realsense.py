@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.perception.camera_record import CameraRecord
+from sidestep.perception.device_clock import DeviceClock
 from sidestep.perception.frame import Frame
 
 if TYPE_CHECKING:
@@ -32,23 +33,13 @@ class RealSense:
     the device sends it: neither filtered nor aligned to colour.
 
     The time of a frame is when the middle of its exposure was, on the clock of `time.monotonic()`, which is that of
-    `Controller.step`: the driver's time stamp, less the time from mid-exposure to that stamp where the device states
-    both, plus `clock_offset`. `time_domain` says what the stamp is:
-
-    - global_time (D400 on Linux and Windows): the driver has matched the device's clock with the computer's. The offset
-      is that of the computer's two clocks, read anew for each frame, so that a set clock does no harm.
-    - system_time: the computer's clock when the image came. Frames are said to be younger than they are, by exposure
-      and transport, 20–40 ms: measure that (`sidestep camera check`) and give it as `latency`.
-    - hardware_clock: a clock of the device. The offset is the least of (arrival - stamp) so far: right but for the
-      shortest transport, for which `latency` stands again.
+    `Controller.step`; see `DeviceClock` for how well it is known.
 
     Attributes:
         camera: what the device says of itself.
         cameras: the same, in a list, as recordings have it.
         joint_names: empty; the state is told to the controller by `step`.
         times_known: True.
-        time_domain: of the last frame, as above; "" before the first.
-        clock_offset: added to the last time stamp [s]; nan before the first.
         lost: images that the device numbered and nobody read.
     """
 
@@ -76,7 +67,7 @@ class RealSense:
             serial: number of the device; None: the only one.
             pose: pose (4, 4) of the camera in the world, or in `link`.
             link: the link of the arm that carries the camera; "" for one that stands in the world.
-            latency: subtracted from the times [s], see above.
+            latency: subtracted from the times [s], see `DeviceClock`.
             device: an opened device instead of one at a port.
 
         Raises:
@@ -85,16 +76,14 @@ class RealSense:
                 names those there are.
         """
         self._rs = _driver()
-        if not np.isfinite(latency):
-            raise ValueError(f"latency is {latency} s, must be finite")
         self._device = _found_device(self._rs, serial) if device is None else device
         self._sensor = _depth_sensor(self._device)
         self._profile = self._chosen_profile(width, height, rate)
         self.camera = self._record(name, pose, link)
         self.cameras = [self.camera]
         self.joint_names: tuple[str, ...] = ()
-        self.time_domain, self.clock_offset, self.lost = "", float("nan"), 0
-        self._latency, self._least_delay, self._number = latency, float("inf"), -1
+        self.lost = 0
+        self._clock, self._number = DeviceClock(latency), -1
         self._queue: Any = None
 
     def __enter__(self) -> RealSense:
@@ -132,7 +121,7 @@ class RealSense:
         if self._number >= 0 and number > self._number + 1:
             self.lost += number - self._number - 1
         self._number = number
-        captured = self._capture_time(depth, arrival)
+        captured = self._captured(depth, arrival)
         pixels = np.array(depth.get_data(), dtype=np.uint16)  # a copy: the driver uses its buffer again
         return Frame(self.camera.name, captured, pixels, _rounded(depth.get_units()))
 
@@ -141,22 +130,28 @@ class RealSense:
         while True:
             yield self.read(timeout=timeout)
 
-    def _capture_time(self, depth: Any, arrival: float) -> float:
+    def _captured(self, depth: Any, arrival: float) -> float:
         """When the middle of the exposure was, on the clock of `time.monotonic()` [s]."""
-        stamp = 1e-3 * depth.get_timestamp()
-        self.time_domain = depth.get_frame_timestamp_domain().name
-        if self.time_domain == "hardware_clock":
-            self._least_delay = min(self._least_delay, arrival - stamp)
-            self.clock_offset = self._least_delay
-        else:
-            self.clock_offset = time.monotonic() - time.time()
         metadata = self._rs.frame_metadata_value
         both = (metadata.frame_timestamp, metadata.sensor_timestamp)
         since_exposure = 0.0
-        if self.time_domain != "system_time" and all(depth.supports_frame_metadata(value) for value in both):
+        if all(depth.supports_frame_metadata(value) for value in both):
             readout, middle = (depth.get_frame_metadata(value) for value in both)
             since_exposure = 1e-6 * (readout - middle)
-        return float(stamp - since_exposure + self.clock_offset - self._latency)
+        domain = depth.get_frame_timestamp_domain().name
+        return self._clock.captured(
+            1e-3 * depth.get_timestamp(), domain, arrival=arrival, since_exposure=since_exposure
+        )
+
+    @property
+    def time_domain(self) -> str:
+        """What the last time stamp was, see `DeviceClock`; "" before the first."""
+        return self._clock.domain
+
+    @property
+    def clock_offset(self) -> float:
+        """Added to the last time stamp [s]; nan before the first."""
+        return self._clock.offset
 
     def _chosen_profile(self, width: int | None, height: int | None, rate: int | None) -> Any:
         """The stream of depth of a size and rate; the default one where it fits."""

@@ -21,9 +21,10 @@ _QUANTISED = struct.Struct(
 )  # heads a compressedDepth image: kind, and A, B of 32FC1: depth = A / (value - B)
 
 
-def seconds(stamp: Any) -> float:
-    """The time [s] of a `builtin_interfaces/Time`."""
-    return float(stamp.sec + stamp.nanosec * 1e-9)
+def time_of(message: Any, received: int) -> float:
+    """The time [s] of a message's header; where that is 0, when the bag received it [ns]."""
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9) or received * 1e-9
 
 
 def image_depth(message: Any, owner: str) -> npt.NDArray[Any]:
@@ -73,8 +74,10 @@ def compressed_depth(message: Any, owner: str) -> npt.NDArray[Any]:
     return np.where(values == 0, np.float32(np.nan), depth)
 
 
-def camera_record(message: Any, name: str, *, owner: str, unit: float, **pose: Any) -> CameraRecord:
-    """The camera of a `sensor_msgs/CameraInfo`: K, or where the images are rectified the same, and its distortion.
+def camera_record(
+    message: Any, name: str, *, owner: str, rectified: bool, unit: float, **pose: Any
+) -> CameraRecord:
+    """The camera of a `sensor_msgs/CameraInfo`: K and the distortion d, or P alone of images that were rectified.
 
     plumb_bob is brown_conrady, and so is rational_polynomial where k4 to k6 are 0; equidistant is kannala_brandt. Where
     all coefficients are 0 the model is none.
@@ -83,6 +86,7 @@ def camera_record(message: Any, name: str, *, owner: str, unit: float, **pose: A
         message: the message.
         name: of the camera.
         owner: what an error calls the message.
+        rectified: whether the distortion was taken out of the images.
         unit: of its images, see `CameraRecord`.
         pose: `pose` and `link` of the record.
 
@@ -96,6 +100,9 @@ def camera_record(message: Any, name: str, *, owner: str, unit: float, **pose: A
             f"{owner}: binning {message.binning_x} x {message.binning_y} and a region of {message.roi.width} x "
             f"{message.roi.height} pixels; only whole images are read"
         )
+    if rectified and np.any(message.d):
+        fx, fy, cx, cy = pinhole(np.reshape(message.p, (3, 4))[:, :3], f"{owner}: P")
+        return CameraRecord(name, int(message.width), int(message.height), fx, fy, cx, cy, unit=unit, **pose)
     fx, fy, cx, cy = pinhole(np.reshape(message.k, (3, 3)), owner)
     model, coefficients = _distortion(
         message.distortion_model, np.asarray(message.d, dtype=np.float64), owner
