@@ -223,6 +223,13 @@ def test_the_extras_hold_what_the_errors_say() -> None:
             "from sidestep.studio.server import guarded_server; guarded_server('127.0.0.1', 0, None)",
             "studio",
         ),
+        (
+            "rosbags",
+            "from sidestep.perception import BagRecording; BagRecording(sys.prefix)",
+            "camera",
+        ),
+        ("PIL", "from sidestep.perception import read_depth_png; read_depth_png(b'')", "camera"),
+        ("pyrealsense2", "from sidestep.perception import RealSense; RealSense('front')", "realsense"),
         ("playwright", "from sidestep.studio import headless; headless.check_browser()", "headless"),
         (
             "av",

@@ -15,7 +15,7 @@ from python_code import Imports, room  # noqa: E402
 ORDER = (
     *("extras", "plugins", "storage", "math"),
     *("shapes", "robot", "shipped_arms", "obstacles", "drawing", "body", "distance", "arm"),
-    *("control", "controller", "planning", "system"),
+    *("control", "controller", "perception", "planning", "system"),
     *("simulation", "scenario", "report", "bench", "studio", "cli", "__main__"),
     "thesis",
 )

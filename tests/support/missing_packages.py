@@ -11,7 +11,7 @@ from pathlib import Path
 from sidestep.extras import MODULES
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-OPTIONAL = sorted(module for modules in MODULES.values() for module in modules)
+OPTIONAL = sorted({module for modules in MODULES.values() for module in modules})
 
 # Begins programs in which some packages are not installed.
 HIDE = """
@@ -39,7 +39,8 @@ def held_by(extra: str) -> set[str]:
 def missing_without(*extras: str) -> list[str]:
     """The packages of extras that are not installed where these extras are."""
     held = set().union(*map(held_by, extras))
-    return sorted(module for extra, modules in MODULES.items() if extra not in held for module in modules)
+    there = {module for extra in held for module in MODULES.get(extra, ())}
+    return sorted(set(OPTIONAL) - there)
 
 
 def run(code: str, *arguments: str | Path, folder: Path | None = None) -> subprocess.CompletedProcess[str]:

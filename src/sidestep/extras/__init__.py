@@ -16,6 +16,8 @@ from types import ModuleType
 MODULES: dict[str, tuple[str, ...]] = {
     "prepare": ("coal", "collada", "jsonschema", "jsonschema_rs", "pypcd4", "trimesh", "xacro"),
     "simulation": ("matplotlib", "mujoco", "PIL", "yaml"),
+    "camera": ("PIL", "rosbags"),
+    "realsense": ("pyrealsense2",),
     "studio": ("viser", "websockets"),
     "headless": ("av", "playwright"),
     "thesis": ("sklearn", "threadpoolctl"),
@@ -26,12 +28,14 @@ _CHAIN = ("prepare", "simulation", "studio", "headless")  # each holds those bef
 ROOMS = {
     "bench": "simulation",
     "drawing": "simulation",
+    "perception": "camera",
     "report": "simulation",
     "reproduce": "simulation",
     "scenario": "simulation",
     "studio": "studio",
 }
-_EXTRA_OF = {module: extra for extra, modules in MODULES.items() for module in modules}
+# Where two extras hold a module, the first counts, but for rooms that need the other.
+_EXTRA_OF = {module: extra for extra, modules in reversed(MODULES.items()) for module in modules}
 _IMPORT_SYSTEM = ("_frozen_importlib", "importlib._bootstrap", "importlib")  # `importlib.util` only looks
 
 
@@ -72,7 +76,10 @@ class _Finder:
             rooms = {
                 caller.split(".")[1] for caller in (importer, *callers) if caller.startswith("sidestep.")
             }
-            extra = max([extra, *(ROOMS[room] for room in rooms & ROOMS.keys())], key=_CHAIN.index)
+            needed = {ROOMS[room] for room in rooms & ROOMS.keys()}
+            beside = [other for other in needed.difference(_CHAIN) if name in MODULES[other]]
+            chain = needed.intersection(_CHAIN)
+            extra = beside[0] if beside and not chain else max({extra} | chain, key=_CHAIN.index)
         raise MissingExtraError(
             f"{importer} needs the package {name!r}, which is not installed: {install(extra)}", name=name
         )

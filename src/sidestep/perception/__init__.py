@@ -1,0 +1,6 @@
+"""Depth images: where they come from, and what a frame of them is."""
+
+import lazy_loader
+
+# The names stand in __init__.pyi and are imported on first use: a camera needs no reader of bags.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,10 @@
+from .bag import BagRecording as BagRecording
+from .bag_writer import BagWriter as BagWriter
+from .camera_record import CameraRecord as CameraRecord
+from .folder import FolderRecording as FolderRecording
+from .folder_writer import FolderWriter as FolderWriter
+from .frame import Frame as Frame
+from .image_file import read_depth_png as read_depth_png
+from .realsense import RealSense as RealSense
+from .recording import Recording as Recording
+from .recording import open_recording as open_recording
