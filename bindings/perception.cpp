@@ -123,7 +123,13 @@ double as_capture_time(nb::handle time) {
   return seconds;
 }
 
-Eigen::VectorXd as_state(nb::handle q) { return q.is_none() ? Eigen::VectorXd() : as_finite_vector(q, "q"); }
+Capture as_capture(nb::handle time, nb::handle q, nb::handle pose) {
+  Capture capture{as_capture_time(time), q.is_none() ? Eigen::VectorXd() : as_finite_vector(q, "q"), std::nullopt};
+  if (!pose.is_none()) {
+    capture.pose = python::as_pose(pose);
+  }
+  return capture;
+}
 
 /// A numpy array (height, width) with a copy of the data.
 template <class Number>
@@ -294,16 +300,15 @@ void bind_perception(nb::module_& m) {
           "Raises ValueError that names the camera or the setting, its value and what is allowed.")
       .def(
           "update",
-          [](Perception& self, const std::string& camera, nb::handle depth, nb::handle time, nb::handle unit, nb::handle q) {
+          [](Perception& self, const std::string& camera, nb::handle depth, nb::handle time, nb::handle unit, nb::handle q, nb::handle pose) {
             const Pixels pixels = as_depth(depth, camera_of(self, camera), unit);
-            const double captured = as_capture_time(time);
-            const Eigen::VectorXd state = as_state(q);
+            const Capture capture = as_capture(time, q, pose);
             const nb::gil_scoped_release release;
-            return self.update(camera, pixels.raw, captured, state);
+            return self.update(camera, pixels.raw, capture);
           },
-          nb::arg("camera"), nb::arg("depth"), nb::kw_only(), nb::arg("time"), nb::arg("unit") = nb::none(), nb::arg("q") = nb::none(),
+          nb::arg("camera"), nb::arg("depth"), nb::kw_only(), nb::arg("time"), nb::arg("unit") = nb::none(), nb::arg("q") = nb::none(), nb::arg("pose") = nb::none(),
           nb::sig("def update(self, camera: str, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None, "
-                  "q: numpy.typing.ArrayLike | None = None) -> PerceptionReport"),
+                  "q: numpy.typing.ArrayLike | None = None, pose: numpy.typing.ArrayLike | None = None) -> PerceptionReport"),
           "Takes an image of a camera, and gives the controller what it shows.\n"
           "\n"
           "Args:\n"
@@ -312,23 +317,23 @@ void bind_perception(nb::module_& m) {
           "    time: when it was captured [s], on the clock of `step`.\n"
           "    unit: of a depth [m]; None: 0.001 of uint16, 1 of float.\n"
           "    q: (nv,) of the arm at that time; None: as `step` was told.\n"
+          "    pose: (4, 4) of the optical frame in the world at that time; None: as the camera is mounted.\n"
           "\n"
           "Returns what became of it. Raises ValueError or TypeError that names the value and what is allowed.")
       .def(
           "update_points",
-          [](Perception& self, const std::string& camera, nb::handle points, nb::handle time, nb::handle q) {
+          [](Perception& self, const std::string& camera, nb::handle points, nb::handle time, nb::handle q, nb::handle pose) {
             Eigen::Matrix3Xd given = Eigen::Matrix3Xd(3, 0);
             const nb::object flat = nb::module_::import_("numpy").attr("asarray")(points, "float64").attr("reshape")(-1, 3);
             const auto rows = nb::cast<nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(flat);
             given = Eigen::Map<const Eigen::Matrix3Xd>(rows.data(), 3, static_cast<Eigen::Index>(rows.shape(0)));
-            const double captured = as_capture_time(time);
-            const Eigen::VectorXd state = as_state(q);
+            const Capture capture = as_capture(time, q, pose);
             const nb::gil_scoped_release release;
-            return self.update(camera, given, captured, state);
+            return self.update(camera, given, capture);
           },
-          nb::arg("camera"), nb::arg("points"), nb::kw_only(), nb::arg("time"), nb::arg("q") = nb::none(),
-          nb::sig("def update_points(self, camera: str, points: numpy.typing.ArrayLike, *, time: float, q: numpy.typing.ArrayLike | None = None) "
-                  "-> PerceptionReport"),
+          nb::arg("camera"), nb::arg("points"), nb::kw_only(), nb::arg("time"), nb::arg("q") = nb::none(), nb::arg("pose") = nb::none(),
+          nb::sig("def update_points(self, camera: str, points: numpy.typing.ArrayLike, *, time: float, q: numpy.typing.ArrayLike | None = None, "
+                  "pose: numpy.typing.ArrayLike | None = None) -> PerceptionReport"),
           "The same of a cloud in the camera's optical frame [m]: (N, 3), or organised (height, width, 3); nan: nothing seen.")
       .def(
           "leave_out",

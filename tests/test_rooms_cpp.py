@@ -7,7 +7,9 @@ import pytest
 
 CPP = Path(__file__).parents[1] / "cpp"
 ROOTS = {"src": CPP / "src", "include": CPP / "include"}
-ROOMS = ("math robot scene body clearance arm attractor constraints guard planning controller perception thesis").split()
+ROOMS = (
+    "math robot scene body clearance arm attractor constraints guard planning controller perception thesis"
+).split()
 
 
 def included(file: Path, text: str) -> list[Path]:

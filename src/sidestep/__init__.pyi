@@ -11,6 +11,7 @@ from ._core import __version__ as __version__
 from ._core import integrate as integrate
 from ._core import integrate_batch as integrate_batch
 from ._core import replay as replay
+from . import perception as perception
 from .arm import Arm as Arm
 from .body import Body as Body
 from .distance import ExactClearance as ExactClearance

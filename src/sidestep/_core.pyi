@@ -3764,6 +3764,421 @@ class RealTimeRecord:
 
     def __repr__(self) -> str: ...
 
+class DepthNoise:
+    """
+    Noise of a depth camera: standard deviation sigma(z) = constant + quadratic z^2 of a depth z [m].
+
+    For stereo quadratic = s/(f b), with the error s of a disparity [pixel], focal length f [pixel] and baseline b [m].
+    """
+
+    @overload
+    def __init__(self) -> None: ...
+
+    @overload
+    def __init__(self, constant: float = 0.001, quadratic: float = 0.004) -> None: ...
+
+    @property
+    def constant(self) -> float:
+        """[m]"""
+
+    @property
+    def quadratic(self) -> float:
+        """[1/m]"""
+
+    def sigma(self, z: float) -> float:
+        """Standard deviation of a depth z [m]."""
+
+    def __repr__(self) -> str: ...
+
+class DepthCamera:
+    """
+    A depth camera: its size, intrinsics, place, noise and errors.
+
+    Pixel (u, v), integer at its centre, u to the right and v down, sees along the ray (x, y, 1) of the optical frame (x right,
+    y down, z forward), x = (u - cx)/fx and y = (v - cy)/fy where the lens does not distort. A depth is the z of what is seen.
+    """
+
+    def __init__(self, name: str, *, width: int, height: int, fx: float, fy: float, cx: float, cy: float, pose: numpy.typing.ArrayLike, link: str = '', distortion_model: str = 'none', distortion: numpy.typing.ArrayLike | None = None, noise: DepthNoise = ..., near: float = 0.1, far: float = 4.0, translation_error: float = 0.005, rotation_error: float = 0.005, clock_error: float = 0.005) -> None:
+        """
+        Args:
+            name: by which images come, and name of its source of obstacles.
+            width, height: of the image [pixel].
+            fx, fy, cx, cy: focal lengths and principal point [pixel].
+            pose: (4, 4) of the optical frame in the world; on a link in its frame.
+            link: frame of the arm on which it is mounted; '': none.
+            distortion_model: 'none', 'brown_conrady' (k1, k2, p1, p2, k3; ROS: plumb_bob), 'inverse_brown_conrady' (RealSense) or
+                'kannala_brandt' (k1 to k4; ROS: equidistant).
+            distortion: up to 5 coefficients.
+            noise: of depths.
+            near, far: range in which depths are believed [m].
+            translation_error, rotation_error: by how much the pose may be wrong [m], [rad].
+            clock_error: the same of times of capture [s].
+
+        Raises ValueError that names the camera, the value and what is allowed.
+        """
+
+    @property
+    def name(self) -> str:
+        """By which images come."""
+
+    @property
+    def width(self) -> int:
+        """[pixel]"""
+
+    @property
+    def height(self) -> int:
+        """[pixel]"""
+
+    @property
+    def fx(self) -> float:
+        """Focal length [pixel]."""
+
+    @property
+    def fy(self) -> float:
+        """Focal length [pixel]."""
+
+    @property
+    def cx(self) -> float:
+        """Principal point [pixel]."""
+
+    @property
+    def cy(self) -> float:
+        """Principal point [pixel]."""
+
+    @property
+    def distortion_model(self) -> str:
+        """Model of the lens."""
+
+    @property
+    def distortion(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Coefficients (5,) of the lens."""
+
+    @property
+    def link(self) -> str:
+        """Frame of the arm on which it is mounted; '': none."""
+
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Pose (4, 4) in the world, or on its link."""
+
+    @property
+    def noise(self) -> DepthNoise:
+        """Noise of depths."""
+
+    @property
+    def near(self) -> float:
+        """Least depth [m]."""
+
+    @property
+    def far(self) -> float:
+        """Largest depth [m]."""
+
+    @property
+    def translation_error(self) -> float:
+        """Error of the pose [m]."""
+
+    @property
+    def rotation_error(self) -> float:
+        """Error of the pose [rad]."""
+
+    @property
+    def clock_error(self) -> float:
+        """Error of times of capture [s]."""
+
+    def project(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image.
+        """
+
+    def __repr__(self) -> str: ...
+
+class PixelLabel(enum.IntEnum):
+    """What a pixel shows."""
+
+    nothing = 0
+    """No depth, or one that is too near."""
+
+    obstacle = 1
+    """Something that is not the arm."""
+
+    arm = 2
+    """The arm, or an object that it holds."""
+
+    edge = 3
+    """A depth between two surfaces, which is on neither: a flying pixel."""
+
+    explained = 4
+    """A shape that was told."""
+
+    left_out = 5
+    """In a region that is left out."""
+
+    outside = 6
+    """Beyond the range of the camera."""
+
+class ArmResidual:
+    """
+    How far what a camera sees is from where the arm should be: of rays through the cores of its cover.
+    """
+
+    @property
+    def rays(self) -> int:
+        """Rays with a depth."""
+
+    @property
+    def on_arm(self) -> int:
+        """Those that end on the arm."""
+
+    @property
+    def through(self) -> int:
+        """Those that end behind it."""
+
+    @property
+    def depth_error(self) -> float:
+        """
+        Mean of the measured depth less that of the grown cover, of those on the arm [m].
+        """
+
+    @property
+    def through_share(self) -> float:
+        """Share of rays that see through the arm, of those that nothing hides."""
+
+class PerceptionReport:
+    """What became of an image, and what it cost."""
+
+    @property
+    def used(self) -> bool:
+        """
+        False: nobody knows where the arm was at the time of capture, or the image shows nothing; obstacles are as before.
+        """
+
+    @property
+    def obstacle_pixels(self) -> int:
+        """Number of pixels that show something else than the arm."""
+
+    @property
+    def arm_pixels(self) -> int:
+        """Number of pixels that show the arm."""
+
+    @property
+    def edge_pixels(self) -> int:
+        """Number of flying pixels."""
+
+    @property
+    def seen(self) -> int:
+        """Number of obstacles that this camera shows now."""
+
+    @property
+    def remembered(self) -> int:
+        """Number of those that no camera shows now."""
+
+    @property
+    def explained(self) -> int:
+        """Number of cells that told shapes explain, or that are left out."""
+
+    @property
+    def unseen(self) -> int:
+        """Number of obstacles where nobody has looked."""
+
+    @property
+    def arm(self) -> ArmResidual:
+        """Where the arm is, of this image."""
+
+    @property
+    def through(self) -> float:
+        """Share of rays that see through the arm, smoothed over half a second."""
+
+    @property
+    def question(self) -> str:
+        """What is hard to believe, in words; empty: nothing."""
+
+    @property
+    def depth_time(self) -> float:
+        """Time for depths and edges [s]."""
+
+    @property
+    def mask_time(self) -> float:
+        """Time to take the arm out [s]."""
+
+    @property
+    def map_time(self) -> float:
+        """Time for points and map [s]."""
+
+    @property
+    def unseen_time(self) -> float:
+        """Time for unseen space [s]."""
+
+    @property
+    def obstacles_time(self) -> float:
+        """Time to hand obstacles to the controller [s]."""
+
+    @property
+    def total_time(self) -> float:
+        """Sum of the times [s]."""
+
+class PerceptionSettings:
+    """
+    How what cameras see becomes obstacles.
+
+        voxel [m], default 0.02, allowed 0.005 to 0.1: Edge of the cells in which points are merged, within reach of the arm. Smaller cells reach out less, by up to 0.87 of the edge, and cost more.
+        reach_margin [m], default 0.25, allowed 0 to 2: Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is 1.5 and 2.5 times as long.
+        view_margin [m], default 2.0, allowed 0 to 5: Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes.
+        memory [s], default 30.0, allowed 0 to inf: Time for which something is kept that was seen and is hidden or out of view now. What was seen for less than a tenth of it is kept for ten times as long as it was seen. Longer keeps more that is gone.
+        clear_after, default 2, allowed 1 to 10: Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later.
+        least_pixels, default 3, allowed 1 to 100: Number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it. More is safer against noise, and sees thin things later.
+        unseen_is_free, default True, allowed 0 to 1: Whether space that no camera has seen yet counts as free. Otherwise the arm does not enter it: it keeps clear of what nobody has looked at, and reaches less.
+        valid_for [s], default 0.25, allowed 0 to inf: Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images.
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, voxel: float = 0.02, reach_margin: float = 0.25, view_margin: float = 2.0, memory: float = 30.0, clear_after: int = 2, least_pixels: int = 3, unseen_is_free: bool = True, valid_for: float = 0.25) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: PerceptionSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> PerceptionSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def voxel(self) -> float: ...
+
+    @voxel.setter
+    def voxel(self, value: float, /) -> None: ...
+
+    @property
+    def reach_margin(self) -> float: ...
+
+    @reach_margin.setter
+    def reach_margin(self, value: float, /) -> None: ...
+
+    @property
+    def view_margin(self) -> float: ...
+
+    @view_margin.setter
+    def view_margin(self, value: float, /) -> None: ...
+
+    @property
+    def memory(self) -> float: ...
+
+    @memory.setter
+    def memory(self, value: float, /) -> None: ...
+
+    @property
+    def clear_after(self) -> int: ...
+
+    @clear_after.setter
+    def clear_after(self, value: int, /) -> None: ...
+
+    @property
+    def least_pixels(self) -> int: ...
+
+    @least_pixels.setter
+    def least_pixels(self, value: int, /) -> None: ...
+
+    @property
+    def unseen_is_free(self) -> bool: ...
+
+    @unseen_is_free.setter
+    def unseen_is_free(self, value: bool, /) -> None: ...
+
+    @property
+    def valid_for(self) -> float: ...
+
+    @valid_for.setter
+    def valid_for(self, value: float, /) -> None: ...
+
+class Perception:
+    """
+    From depth cameras to the obstacles of a controller: takes the arm out of the image, remembers what is hidden, and hands
+    the rest on.
+
+    Each camera is a source of the controller, of its name. What no camera shows now is the source 'memory'; where nobody has
+    looked, if that counts as occupied, 'unseen'. Calls from several threads wait for each other; none waits for `step`.
+    """
+
+    def __init__(self, controller: Controller, cameras: Sequence[DepthCamera], settings: PerceptionSettings | None = None) -> None:
+        """
+        Raises ValueError that names the camera or the setting, its value and what is allowed.
+        """
+
+    def update(self, camera: str, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None, q: numpy.typing.ArrayLike | None = None, pose: numpy.typing.ArrayLike | None = None) -> PerceptionReport:
+        """
+        Takes an image of a camera, and gives the controller what it shows.
+
+        Args:
+            camera: its name.
+            depth: (height, width) uint16 or float; 0, nan and inf: nothing seen.
+            time: when it was captured [s], on the clock of `step`.
+            unit: of a depth [m]; None: 0.001 of uint16, 1 of float.
+            q: (nv,) of the arm at that time; None: as `step` was told.
+            pose: (4, 4) of the optical frame in the world at that time; None: as the camera is mounted.
+
+        Returns what became of it. Raises ValueError or TypeError that names the value and what is allowed.
+        """
+
+    def update_points(self, camera: str, points: numpy.typing.ArrayLike, *, time: float, q: numpy.typing.ArrayLike | None = None, pose: numpy.typing.ArrayLike | None = None) -> PerceptionReport:
+        """
+        The same of a cloud in the camera's optical frame [m]: (N, 3), or organised (height, width, 3); nan: nothing seen.
+        """
+
+    def leave_out(self, name: str, region: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape], *, grow: float = 0.02, link: str = '') -> None:
+        """
+        What is within `grow` [m] of the region is no obstacle: what is to be grasped, or a place where noise is known. In the world, or
+        in the frame of a link. Replaces a region of the same name.
+        """
+
+    def take_in(self, name: str) -> None:
+        """Undoes `leave_out`. Raises ValueError that lists the regions."""
+
+    def forget(self) -> None:
+        """Forgets all that was seen."""
+
+    @property
+    def cameras(self) -> list[DepthCamera]:
+        """The cameras."""
+
+    @property
+    def settings(self) -> PerceptionSettings:
+        """The settings."""
+
+    def pose(self, camera: str) -> numpy.typing.NDArray[numpy.float64]:
+        """Pose (4, 4) of a camera in the world at its last image."""
+
+    def time(self, camera: str) -> float:
+        """Time of capture of its last image [s]; nan before the first."""
+
+    def depth(self, camera: str) -> numpy.typing.NDArray[numpy.float32]:
+        """Depth [m] of the last image (height, width); 0: nothing seen."""
+
+    def labels(self, camera: str) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        What each pixel of the last image shows (height, width), a PixelLabel each.
+        """
+
+    def cells(self) -> dict[str, numpy.typing.NDArray[Any]]:
+        """
+        The obstacles that were handed to the controller: centres (N, 3) [m], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
+        no camera shows it now, hidden (N,): something is in front of it.
+        """
+
+    def unseen(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Middles (N, 3) of cells where nobody has looked and that border on seen space [m].
+        """
+
 class CollisionDensity(Embedding):
     """
     The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),

@@ -8,10 +8,10 @@
 namespace sidestep {
 namespace {
 
-constexpr float noise_of_depth = 3.0f;   // Noise along the ray that a pixel of the arm may have, in standard deviations.
-constexpr double pixels_at_edge = 1.0;   // Error of a silhouette [pixel].
-constexpr double core_share = 0.5;       // Semi-axes of an ellipsoid's core, as a share of its own: links fill it.
-constexpr int core_stride = 4;           // Every how many pixels rays through cores are looked at, in both directions.
+constexpr float noise_of_depth = 3.0f;  // Noise along the ray that a pixel of the arm may have, in standard deviations.
+constexpr double pixels_at_edge = 1.0;  // Error of a silhouette [pixel].
+constexpr double core_share = 0.5;      // Semi-axes of an ellipsoid's core, as a share of its own: links fill it.
+constexpr int core_stride = 4;          // Every how many pixels rays through cores are looked at, in both directions.
 constexpr float no_front = std::numeric_limits<float>::infinity();
 
 /// The displacement of the farthest point of an ellipsoid between two states [m], at most.
@@ -66,7 +66,8 @@ double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& cam
   const KinematicState::Link& link = link_or_world(*arm.now, ellipsoid.joint);
   const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - X_WC.translation()).norm();
   const double moved = std::max(displacement(ellipsoid, *arm.before, *arm.now), displacement(ellipsoid, *arm.now, *arm.after));
-  return camera.translation_error + camera.rotation_error * distance + pixels_at_edge * distance / std::min(camera.fx, camera.fy) + moved;
+  return camera.translation_error + camera.rotation_error * distance +
+         pixels_at_edge * distance / std::min(camera.fx, camera.fy) + moved;
 }
 
 void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const Eigen::Isometry3d& X_WC, const ArmStates& arm,
@@ -140,14 +141,16 @@ void ArmMask::measure(const Seen& core, const DepthCamera& camera, const CameraR
       const float x = rays.x()[i], y = rays.y()[i], z = image.depth()[i];
       const float a = x * (core.a[0] * x + core.a[2] * y + core.a[3]) + y * (core.a[1] * y + core.a[4]) + core.a[5];
       const float b = core.b[0] * x + core.b[1] * y + core.b[2];
-      if (b * b < a * core.gamma || b <= 0.0f || image.labels()[i] == PixelLabel::nothing || image.labels()[i] == PixelLabel::edge) {
+      if (b * b < a * core.gamma || b <= 0.0f || image.labels()[i] == PixelLabel::nothing ||
+          image.labels()[i] == PixelLabel::edge) {
         continue;
       }
       ++residual_.rays;
       if (image.labels()[i] == PixelLabel::arm) {
         ++residual_.on_arm;
         depth_errors_ += static_cast<double>(z - front_[i]);
-      } else if (static_cast<double>(z) > static_cast<double>(front_[i]) + noise_of_depth * camera.noise.sigma(static_cast<double>(z))) {
+      } else if (static_cast<double>(z) >
+                 static_cast<double>(front_[i]) + noise_of_depth * camera.noise.sigma(static_cast<double>(z))) {
         ++residual_.through;
       }
     }

@@ -20,7 +20,8 @@ constexpr int undistort_rounds = 30;        // Rounds of the fixed-point iterati
 Eigen::Vector2d brown_conrady(const std::array<double, 5>& k, double x, double y) noexcept {
   const double r2 = x * x + y * y;
   const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
-  return {x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x), y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y};
+  return {x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
+          y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y};
 }
 
 /// Angle in the image of an angle θ to the optical axis (Kannala and Brandt 2006).
@@ -81,8 +82,8 @@ void DepthCamera::validate() const {
     throw std::invalid_argument("camera: its name is '', allowed: a name, such as 'front'");
   }
   if (width < 1 || height < 1 || width > most_pixels_of_side || height > most_pixels_of_side) {
-    refuse_camera(*this, "the image is " + std::to_string(width) + " × " + std::to_string(height) +
-                             " pixels, allowed: 1 to 16384 each");
+    refuse_camera(
+        *this, "the image is " + std::to_string(width) + " × " + std::to_string(height) + " pixels, allowed: 1 to 16384 each");
   }
   check_numbers(*this);
   if (!pose.matrix().allFinite()) {
@@ -94,11 +95,8 @@ void DepthCamera::validate() const {
 Eigen::Vector2d DepthCamera::project(const Eigen::Vector3d& p) const noexcept {
   Eigen::Vector2d point = p.head<2>() / p.z();
   switch (distortion_model) {
-    case DistortionModel::none:
-      break;
-    case DistortionModel::brown_conrady:
-      point = brown_conrady(distortion, point.x(), point.y());
-      break;
+    case DistortionModel::none: break;
+    case DistortionModel::brown_conrady: point = brown_conrady(distortion, point.x(), point.y()); break;
     case DistortionModel::inverse_brown_conrady:
       point = undo(point, [this](double x, double y) { return brown_conrady(distortion, x, y); });
       break;
@@ -114,14 +112,11 @@ Eigen::Vector2d DepthCamera::project(const Eigen::Vector3d& p) const noexcept {
 Eigen::Vector2d DepthCamera::ray(double u, double v) const noexcept {
   const Eigen::Vector2d point((u - cx) / fx, (v - cy) / fy);
   switch (distortion_model) {
-    case DistortionModel::none:
-      return point;
+    case DistortionModel::none: return point;
     case DistortionModel::brown_conrady:
       return undo(point, [this](double x, double y) { return brown_conrady(distortion, x, y); });
-    case DistortionModel::inverse_brown_conrady:
-      return brown_conrady(distortion, point.x(), point.y());
-    case DistortionModel::kannala_brandt:
-      return undo_fisheye(distortion, point);
+    case DistortionModel::inverse_brown_conrady: return brown_conrady(distortion, point.x(), point.y());
+    case DistortionModel::kannala_brandt: return undo_fisheye(distortion, point);
   }
   return point;
 }
@@ -150,7 +145,8 @@ CameraRays::CameraRays(const DepthCamera& camera)
 }
 
 CameraRays::Window CameraRays::window(double x0, double x1, double y0, double y1) const noexcept {
-  const auto bounds = [](const std::vector<float>& low, const std::vector<float>& high, double from, double to, int& first, int& end) {
+  const auto bounds = [](const std::vector<float>& low, const std::vector<float>& high, double from, double to, int& first,
+                         int& end) {
     const auto hits = [&](int i) {
       const auto k = static_cast<std::size_t>(i);
       return static_cast<double>(high[k]) >= from && static_cast<double>(low[k]) <= to;

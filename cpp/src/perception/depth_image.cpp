@@ -8,15 +8,15 @@
 namespace sidestep {
 namespace {
 
-constexpr float slope_share = 0.03f;  // Difference of neighbouring depths on a slanted surface, as a share of the depth.
-constexpr float noise_reach = 4.0f;   // The same by noise, in standard deviations.
-constexpr float least_support = 1.5f; // Neighbours on the same surface, below which a pixel is flying: two count.
+constexpr float slope_share = 0.03f;   // Difference of neighbouring depths on a slanted surface, as a share of the depth.
+constexpr float noise_reach = 4.0f;    // The same by noise, in standard deviations.
+constexpr float least_support = 1.5f;  // Neighbours on the same surface, below which a pixel is flying: two count.
 
 void check_size(const DepthCamera& camera, std::size_t size) {
   const auto expected = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   if (size != expected) {
-    throw std::invalid_argument("camera '" + camera.name + "': the image has " + std::to_string(size) + " pixels, allowed: " +
-                                std::to_string(camera.width) + " × " + std::to_string(camera.height));
+    throw std::invalid_argument("camera '" + camera.name + "': the image has " + std::to_string(size) +
+                                " pixels, allowed: " + std::to_string(camera.width) + " × " + std::to_string(camera.height));
   }
 }
 
@@ -106,10 +106,10 @@ void DepthImage::mark_edges(const DepthCamera& camera) noexcept {
     }
     PixelLabel* const label = labels_.data() + row;
     for (int u = 0; u < width_; ++u) {
-      label[u] = !(z[u] > 0.0f)                                            ? PixelLabel::nothing
-                 : z[u] > far                                              ? PixelLabel::outside
+      label[u] = !(z[u] > 0.0f)                                          ? PixelLabel::nothing
+                 : z[u] > far                                            ? PixelLabel::outside
                  : support_[static_cast<std::size_t>(u)] < least_support ? PixelLabel::edge
-                                                                           : PixelLabel::obstacle;
+                                                                         : PixelLabel::obstacle;
     }
   }
 }

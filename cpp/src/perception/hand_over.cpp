@@ -10,14 +10,16 @@
 namespace sidestep {
 namespace {
 
-constexpr double border_period = 0.2;   // Time between two searches for the border of unseen space [s].
-constexpr double noise_explained = 3.0; // Noise of a depth that a told shape explains, in standard deviations.
-constexpr double grown = 0.002;         // Growth of a box since it was compared, from which on it is compared again [m].
+constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
+constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
+constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
 Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
 Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
-double radius_of(const Voxel& voxel) { return 0.5 * (high_of(voxel) - low_of(voxel)).norm() + static_cast<double>(voxel.error); }
+double radius_of(const Voxel& voxel) {
+  return 0.5 * (high_of(voxel) - low_of(voxel)).norm() + static_cast<double>(voxel.error);
+}
 
 Obstacles balls(const std::vector<Voxel>& voxels, const std::vector<int>& chosen) {
   if (chosen.empty()) {
@@ -132,9 +134,10 @@ void Perception::Impl::add_unseen(const SeenImage& seen) {
     unseen_time = seen.time;
     border = unseen->border(seen.time);
     const Eigen::Index num = border.cols();
-    controller.set_obstacles(num == 0 ? Obstacles::none()
-                                      : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
-                             {unseen_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
+    controller.set_obstacles(
+        num == 0 ? Obstacles::none()
+                 : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
+        {unseen_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
   }
 }
 
@@ -166,7 +169,8 @@ bool Perception::Impl::is_explained(std::size_t number, const Obstacles* told) {
 bool Perception::Impl::is_left_out(const Voxel& voxel) const {
   for (const Region& region : regions) {
     const Eigen::Vector3d centre =
-        region.frame < 0 ? centre_of(voxel) : Eigen::Vector3d(frame_pose(arm->robot(), now, region.frame).inverse() * centre_of(voxel));
+        region.frame < 0 ? centre_of(voxel)
+                         : Eigen::Vector3d(frame_pose(arm->robot(), now, region.frame).inverse() * centre_of(voxel));
     if (distance_to(region.balls, centre, region.grow + 1e-6) <= region.grow) {
       return true;
     }
@@ -198,7 +202,8 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     }
   }
   View& view = views[number];
-  controller.set_obstacles(balls(voxels, remembered), {memory_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
+  controller.set_obstacles(balls(voxels, remembered),
+                           {memory_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
   if (shown.empty() && std::exchange(view.had_obstacles, false)) {
     controller.remove_obstacles(view.camera.name);  // the image shows that there is nothing: no need to wait for more
   }

@@ -26,8 +26,8 @@ struct Perception::Impl {
     Eigen::Isometry3d X_WC;
     double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
-    double through = 0.0;     // share of rays that see through the arm, smoothed
-    std::uint32_t frame = 0;  // Number of the last image in the map.
+    double through = 0.0;                                      // share of rays that see through the arm, smoothed
+    std::uint32_t frame = 0;                                   // Number of the last image in the map.
     bool had_obstacles = false;
   };
   struct Region {
@@ -48,7 +48,7 @@ struct Perception::Impl {
 
   std::size_t index(const std::string& camera) const;
   template <class Take>
-  PerceptionReport update(std::size_t number, double time, const Eigen::VectorXd& q, Take&& take);
+  PerceptionReport update(std::size_t number, const Capture& capture, Take&& take);
   /// Takes over the arm of the controller, with what it holds.
   void refresh_arm();
   bool find_arm(const View& view, double time, const Eigen::VectorXd& q, PerceptionReport& report);
@@ -76,8 +76,8 @@ struct Perception::Impl {
   double unseen_time = -std::numeric_limits<double>::infinity();  // Time at which its border was found [s].
   Eigen::Matrix3Xd border{3, 0};
   std::vector<Region> regions;
-  std::vector<Tested> tested;      // one per voxel
-  std::vector<char> is_excluded;   // Per voxel: explained or left out.
+  std::vector<Tested> tested;     // one per voxel
+  std::vector<char> is_excluded;  // Per voxel: explained or left out.
 };
 
 }  // namespace sidestep

@@ -13,8 +13,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double least_valid_share = 0.01;  // Share of pixels with a depth, below which an image shows nothing at all.
-constexpr double smoothing_time = 0.5;      // Time constant of the share of rays that see through the arm [s].
+constexpr double least_valid_share = 0.01;      // Share of pixels with a depth, below which an image shows nothing at all.
+constexpr double smoothing_time = 0.5;          // Time constant of the share of rays that see through the arm [s].
 constexpr double through_share_at_most = 0.25;  // The same, above which the arm is not where it should be.
 constexpr int least_rays = 200;                 // Rays through the arm from which on it can be told.
 constexpr double future = 0.5;  // Time by which an image may be newer than the last step before that is worth a word [s].
@@ -44,7 +44,8 @@ Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras,
     const DepthCamera& camera = cameras_[n];
     camera.validate();
     if (camera.name == memory_source || camera.name == unseen_source || camera.name == SourceOptions::scene) {
-      throw std::invalid_argument("camera '" + camera.name + "': the name is that of a source, allowed: others than 'memory', 'unseen' and 'scene'");
+      throw std::invalid_argument("camera '" + camera.name +
+                                  "': the name is that of a source, allowed: others than 'memory', 'unseen' and 'scene'");
     }
     for (std::size_t m = 0; m < n; ++m) {
       if (cameras_[m].name == camera.name) {
@@ -56,36 +57,40 @@ Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras,
 }
 Perception::~Perception() = default;
 
-PerceptionReport Perception::update(const std::string& camera, const RawDepth& depth, double time, const Eigen::VectorXd& q) {
+PerceptionReport Perception::update(const std::string& camera, const RawDepth& depth, const Capture& capture) {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->update(impl_->index(camera), time, q, [&](const DepthCamera& its, DepthImage& image) { image.take(its, depth); });
+  return impl_->update(impl_->index(camera), capture,
+                       [&](const DepthCamera& its, DepthImage& image) { image.take(its, depth); });
 }
 
-PerceptionReport Perception::update(const std::string& camera, const Eigen::Matrix3Xd& points, double time, const Eigen::VectorXd& q) {
+PerceptionReport Perception::update(const std::string& camera, const Eigen::Matrix3Xd& points, const Capture& capture) {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->update(impl_->index(camera), time, q, [&](const DepthCamera& its, DepthImage& image) { image.take(its, points); });
+  return impl_->update(impl_->index(camera), capture,
+                       [&](const DepthCamera& its, DepthImage& image) { image.take(its, points); });
 }
 
 template <class Take>
-PerceptionReport Perception::Impl::update(std::size_t number, double time, const Eigen::VectorXd& q, Take&& take) {
+PerceptionReport Perception::Impl::update(std::size_t number, const Capture& capture, Take&& take) {
   View& view = views[number];
+  const double time = capture.time;
   if (!std::isfinite(time)) {
     throw std::invalid_argument("camera '" + view.camera.name + "': time is " + std::to_string(time) +
                                 ", allowed: seconds on the clock of step, when the image was captured");
   }
   PerceptionReport report;
   refresh_arm();
-  if (!find_arm(view, time, q, report)) {
+  if (!find_arm(view, time, capture.q, report)) {
     return report;
   }
   Clock::time_point mark = Clock::now();
   take(view.camera, view.image);
   report.depth_time = since(mark);
   if (valid_share(view.image) < least_valid_share) {
-    report.question = "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
+    report.question =
+        "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
     return report;
   }
-  const Eigen::Isometry3d X_WC = pose_of(view);
+  const Eigen::Isometry3d X_WC = capture.pose.value_or(pose_of(view));
   view.mask.mark(view.camera, view.rays, X_WC, {&before, &now, &after}, view.image);
   report.mask_time = since(mark);
   const SeenImage seen{view.camera, view.rays, X_WC, view.image, view.mask.front(), static_cast<std::uint8_t>(number), time};
@@ -109,8 +114,8 @@ bool Perception::Impl::find_arm(const View& view, double time, const Eigen::Vect
   const Robot& robot = arm->robot();
   if (q.size() != 0) {
     if (q.size() != robot.num_coordinates() || !q.allFinite()) {
-      throw std::invalid_argument("perception: q has " + std::to_string(q.size()) + " entries, allowed: " +
-                                  std::to_string(robot.num_coordinates()) + ", all finite");
+      throw std::invalid_argument("perception: q has " + std::to_string(q.size()) +
+                                  " entries, allowed: " + std::to_string(robot.num_coordinates()) + ", all finite");
     }
     for (KinematicState* const state : {&before, &now, &after}) {
       state->update(robot, q, zero);
@@ -147,15 +152,17 @@ bool Perception::Impl::find_arm(const View& view, double time, const Eigen::Vect
 void Perception::Impl::judge(View& view, PerceptionReport& report) const {
   report.arm = view.mask.residual();
   if (report.arm.rays >= least_rays) {
-    const double share = std::isnan(view.judged) ? 1.0 : 1.0 - std::exp(-std::max(0.0, view.time - view.judged) / smoothing_time);
+    const double share =
+        std::isnan(view.judged) ? 1.0 : 1.0 - std::exp(-std::max(0.0, view.time - view.judged) / smoothing_time);
     view.through += share * (report.arm.through_share() - view.through);
     view.judged = view.time;
   }
   report.through = view.through;
   if (view.through > through_share_at_most) {
-    report.question = "camera '" + view.camera.name + "': the arm is not where q says, " +
-                      std::to_string(static_cast<int>(std::lround(100.0 * view.through))) +
-                      " % of the rays that should meet it pass; check the camera's pose and the times of its images (sidestep camera check)";
+    report.question =
+        "camera '" + view.camera.name + "': the arm is not where q says, " +
+        std::to_string(static_cast<int>(std::lround(100.0 * view.through))) +
+        " % of the rays that should meet it pass; check the camera's pose and the times of its images (sidestep camera check)";
   }
   for (std::size_t i = 0; i < view.image.size(); ++i) {
     const PixelLabel label = view.image.labels()[i];
@@ -168,8 +175,8 @@ void Perception::Impl::judge(View& view, PerceptionReport& report) const {
 void Perception::leave_out(const std::string& name, const Obstacles& region, double grow, const std::string& link) {
   const std::lock_guard lock(impl_->mutex);
   if (name.empty() || region.size() == 0 || !(grow >= 0.0 && grow <= 1.0)) {
-    throw std::invalid_argument("leave_out: the name is '" + name + "', the region has " + std::to_string(region.size()) + " balls, grow is " +
-                                std::to_string(grow) + " m, allowed: a name, at least one ball, 0 to 1 m");
+    throw std::invalid_argument("leave_out: the name is '" + name + "', the region has " + std::to_string(region.size()) +
+                                " balls, grow is " + std::to_string(grow) + " m, allowed: a name, at least one ball, 0 to 1 m");
   }
   const int frame = link.empty() ? -1 : impl_->arm->robot().frame_index(link);
   impl_->drop_region(name);
@@ -183,7 +190,8 @@ void Perception::take_in(const std::string& name) {
     for (const auto& region : impl_->regions) {
       names += (names.empty() ? "'" : ", '") + region.name + "'";
     }
-    throw std::invalid_argument("take_in: there is no region '" + name + "', there " + (names.empty() ? "is none" : "are: " + names));
+    throw std::invalid_argument("take_in: there is no region '" + name + "', there " +
+                                (names.empty() ? "is none" : "are: " + names));
   }
 }
 

@@ -40,7 +40,8 @@ void UnseenSpace::add(const SeenImage& seen) noexcept {
           continue;
         }
         const Eigen::Vector2d pixel = seen.camera.project(p);
-        if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < seen.camera.width - 1 && pixel.y() < seen.camera.height - 1)) {
+        if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < seen.camera.width - 1 &&
+              pixel.y() < seen.camera.height - 1)) {
           continue;
         }
         const std::size_t n = static_cast<std::size_t>(std::lround(pixel.y())) * static_cast<std::size_t>(seen.camera.width) +

@@ -19,8 +19,9 @@ VoxelGrid::VoxelGrid(const Eigen::Vector3d& centre, double fine, double far, dou
     const double side = std::ceil(2.0 * halves[n] / edges_[n]) + 1.0;
     cells += side * side * side;
     if (cells > most_cells) {
-      throw std::invalid_argument("perception: a voxel of " + std::to_string(voxel) + " m within " + std::to_string(far) +
-                                  " m of the arm's base would take more than 2e8 cells, allowed: larger voxels or smaller margins");
+      throw std::invalid_argument(
+          "perception: a voxel of " + std::to_string(voxel) + " m within " + std::to_string(far) +
+          " m of the arm's base would take more than 2e8 cells, allowed: larger voxels or smaller margins");
     }
     levels_[n] = {static_cast<float>(halves[n]), static_cast<float>(1.0 / edges_[n]), static_cast<int>(side), num_cells_};
     num_cells_ = static_cast<int>(cells);

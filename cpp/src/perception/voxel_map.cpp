@@ -20,7 +20,8 @@ constexpr int samples_free = 3;           // of which so many must be free, and 
 
 VoxelMap::VoxelMap(const Eigen::Vector3d& centre, double reach, const PerceptionSettings& settings)
     : settings_(settings),
-      grid_(centre, reach + settings.reach_margin, reach + std::max(settings.reach_margin, settings.view_margin), settings.voxel),
+      grid_(centre, reach + settings.reach_margin, reach + std::max(settings.reach_margin, settings.view_margin),
+            settings.voxel),
       index_(static_cast<std::size_t>(grid_.num_cells()), -1) {}
 
 void VoxelMap::clear() noexcept {
@@ -139,8 +140,10 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
       voxel.low[axis] = voxel.frame_low[axis];
       voxel.high[axis] = voxel.frame_high[axis];
     } else {
-      voxel.low[axis] = std::min(voxel.frame_low[axis], voxel.low[axis] + shrinks_by * (voxel.frame_low[axis] - voxel.low[axis]));
-      voxel.high[axis] = std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks_by * (voxel.frame_high[axis] - voxel.high[axis]));
+      voxel.low[axis] =
+          std::min(voxel.frame_low[axis], voxel.low[axis] + shrinks_by * (voxel.frame_low[axis] - voxel.low[axis]));
+      voxel.high[axis] =
+          std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks_by * (voxel.frame_high[axis] - voxel.high[axis]));
     }
   }
   voxel.counts = voxel.counts || voxel.pixels >= settings_.least_pixels || shown_again;
@@ -153,8 +156,8 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
 }
 
 VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {
-  const Eigen::Vector3d middle =
-      X_CW * (0.5 * (Eigen::Vector3d(voxel.low[0], voxel.low[1], voxel.low[2]) + Eigen::Vector3d(voxel.high[0], voxel.high[1], voxel.high[2])));
+  const Eigen::Vector3d middle = X_CW * (0.5 * (Eigen::Vector3d(voxel.low[0], voxel.low[1], voxel.low[2]) +
+                                                Eigen::Vector3d(voxel.high[0], voxel.high[1], voxel.high[2])));
   const double edge = this->edge(voxel), half = half_diagonal * edge;
   if (middle.z() <= seen.camera.near + half) {
     return Sight::elsewhere;
@@ -164,7 +167,8 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
   const double behind = middle.z() + half + noise_beyond * seen.camera.noise.sigma(middle.z());
   int num_free = 0, num_inside = 0;
   for (int sample = 0; sample < samples_of_cell; ++sample) {
-    const double side_u = sample == 0 ? 0.0 : (sample % 2 == 0 ? 1.0 : -1.0), side_v = sample == 0 ? 0.0 : (sample < 3 ? 1.0 : -1.0);
+    const double side_u = sample == 0 ? 0.0 : (sample % 2 == 0 ? 1.0 : -1.0),
+                 side_v = sample == 0 ? 0.0 : (sample < 3 ? 1.0 : -1.0);
     const double u = std::round(pixel.x() + side_u * offset_u), v = std::round(pixel.y() + side_v * offset_v);
     if (!(u >= 0.0 && v >= 0.0 && u < seen.camera.width && v < seen.camera.height)) {
       continue;

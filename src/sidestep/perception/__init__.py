@@ -1,4 +1,4 @@
-"""Depth images: where they come from, and what a frame of them is."""
+"""From depth images to obstacles: cameras, where their images come from, and the path from an image to the controller."""
 
 import lazy_loader
 

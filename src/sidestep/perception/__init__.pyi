@@ -5,6 +5,13 @@ from .folder import FolderRecording as FolderRecording
 from .folder_writer import FolderWriter as FolderWriter
 from .frame import Frame as Frame
 from .image_file import read_depth_png as read_depth_png
+from .pipeline import ArmResidual as ArmResidual
+from .pipeline import DepthCamera as DepthCamera
+from .pipeline import DepthNoise as DepthNoise
+from .pipeline import Perception as Perception
+from .pipeline import PerceptionReport as PerceptionReport
+from .pipeline import PerceptionSettings as PerceptionSettings
+from .pipeline import PixelLabel as PixelLabel
 from .realsense import RealSense as RealSense
 from .recording import Recording as Recording
 from .recording import open_recording as open_recording

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import real_array
+from sidestep._core import DepthCamera, real_array
 from sidestep.math.pose import checked_pose
 
 DISTORTION_MODELS = ("none", "brown_conrady", "inverse_brown_conrady", "kannala_brandt")
@@ -69,3 +70,25 @@ class CameraRecord:
         object.__setattr__(self, "distortion", coefficients)
         if self.pose is not None:
             object.__setattr__(self, "pose", checked_pose(self.pose, f"{owner}: pose"))
+
+    def camera(self, **others: Any) -> DepthCamera:
+        """The camera of `Perception`; `others`: what a source does not know, such as pose, noise, far, translation_error.
+
+        Raises:
+            ValueError: the pose is not known and not given.
+        """
+        told: dict[str, Any] = {
+            "width": self.width,
+            "height": self.height,
+            "fx": self.fx,
+            "fy": self.fy,
+            "cx": self.cx,
+            "cy": self.cy,
+            "distortion_model": self.distortion_model,
+            "distortion": self.distortion,
+            "link": self.link,
+            "pose": self.pose,
+        } | others
+        if told["pose"] is None:
+            raise ValueError(f"camera '{self.name}': its source does not know where it is; give pose=")
+        return DepthCamera(self.name, **told)

@@ -40,8 +40,8 @@ class StateHistory {
 
   std::size_t nv_;
   std::vector<Slot> slots_;
-  std::vector<std::atomic<double>> positions_;              // of all slots, nv each
-  std::atomic<std::uint64_t> first_{0}, end_{0};            // Numbers of the first state that counts, and of the one after the last.
+  std::vector<std::atomic<double>> positions_;    // of all slots, nv each
+  std::atomic<std::uint64_t> first_{0}, end_{0};  // Numbers of the first state that counts, and of the one after the last.
 };
 
 }  // namespace sidestep

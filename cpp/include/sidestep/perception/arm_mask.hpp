@@ -22,10 +22,11 @@ struct ArmStates {
 ///
 /// Of rays that pass through the cores of covering ellipsoids, which the links fill.
 struct ArmResidual {
-  int rays = 0;              ///< rays through a core, with a depth
-  int on_arm = 0;            ///< that end on the arm
-  int through = 0;           ///< that end behind the arm: it is not where it should be
-  double depth_error = 0.0;  ///< Mean of the measured depth less that of the cover, of those on the arm [m]: the overshoot of the cover, and errors.
+  int rays = 0;     ///< rays through a core, with a depth
+  int on_arm = 0;   ///< that end on the arm
+  int through = 0;  ///< that end behind the arm: it is not where it should be
+  double depth_error =
+      0.0;  ///< Mean of the measured depth less that of the cover, of those on the arm [m]: the overshoot of the cover, and errors.
 
   /// Share of rays that see through the arm, of those that nothing hides; 0 where there are none.
   double through_share() const noexcept;
@@ -61,7 +62,8 @@ class ArmMask {
     bool holds_camera;
   };
   static Seen see(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, const CameraRays& rays) noexcept;
-  double growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const Eigen::Isometry3d& X_WC, const ArmStates& arm) const noexcept;
+  double growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const Eigen::Isometry3d& X_WC,
+                   const ArmStates& arm) const noexcept;
   void mark(const Seen& seen, const DepthCamera& camera, const CameraRays& rays, DepthImage& image) noexcept;
   void measure(const Seen& core, const DepthCamera& camera, const CameraRays& rays, const DepthImage& image) noexcept;
 

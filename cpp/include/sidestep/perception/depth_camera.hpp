@@ -29,12 +29,12 @@ enum class DistortionModel { none, brown_conrady, inverse_brown_conrady, kannala
 /// x = (u - cx)/fx and y = (v - cy)/fy where the lens does not distort. A depth is the z of what is seen, not its distance.
 struct DepthCamera {
   std::string name;
-  int width = 0, height = 0;                                 ///< [pixel]
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;             ///< focal lengths and principal point [pixel]
+  int width = 0, height = 0;                      ///< [pixel]
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< focal lengths and principal point [pixel]
   DistortionModel distortion_model = DistortionModel::none;
   std::array<double, 5> distortion{};
-  std::string link;                                          ///< Frame of the arm on which it is mounted; empty: the world.
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();    ///< X_WC, or X_LC on a link; x right, y down, z forward
+  std::string link;                                        ///< Frame of the arm on which it is mounted; empty: the world.
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< X_WC, or X_LC on a link; x right, y down, z forward
   DepthNoise noise;
   double near = 0.1, far = 4.0;  ///< range in which depths are believed [m]
   // How wrong pose and times may be.

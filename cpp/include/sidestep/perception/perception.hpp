@@ -16,17 +16,24 @@
 
 namespace sidestep {
 
+/// When an image was captured, and where the arm and the camera were then.
+struct Capture {
+  double time = 0.0;                                     ///< [s] on the clock of Controller::step
+  Eigen::VectorXd q = {};                                ///< (nv) of the arm; empty: as the controller's history says
+  std::optional<Eigen::Isometry3d> pose = std::nullopt;  ///< X_WC of the camera; none: as it is mounted
+};
+
 /// What became of an image, and what it cost.
 struct PerceptionReport {
-  bool used = false;      ///< false: nobody knows where the arm was at the time of capture; obstacles are as before
+  bool used = false;  ///< false: nobody knows where the arm was at the time of capture; obstacles are as before
   int obstacle_pixels = 0, arm_pixels = 0, edge_pixels = 0;
-  int seen = 0;           ///< number of obstacles that this camera shows now
-  int remembered = 0;     ///< number of those that no camera shows now
-  int explained = 0;      ///< number of cells that told shapes explain, or that are left out
-  int unseen = 0;         ///< number of obstacles where nobody has looked
-  ArmResidual arm;        ///< of this image
-  double through = 0.0;   ///< share of rays that see through the arm, smoothed over half a second
-  std::string question;   ///< what is hard to believe, such as that the arm is not where it should be; empty: nothing
+  int seen = 0;          ///< number of obstacles that this camera shows now
+  int remembered = 0;    ///< number of those that no camera shows now
+  int explained = 0;     ///< number of cells that told shapes explain, or that are left out
+  int unseen = 0;        ///< number of obstacles where nobody has looked
+  ArmResidual arm;       ///< of this image
+  double through = 0.0;  ///< share of rays that see through the arm, smoothed over half a second
+  std::string question;  ///< what is hard to believe, such as that the arm is not where it should be; empty: nothing
   /// Times of the stages [s]: depth and edges, mask of the arm, points and map, unseen space, obstacles for the controller.
   double depth_time = 0.0, mask_time = 0.0, map_time = 0.0, unseen_time = 0.0, obstacles_time = 0.0;
 
@@ -48,11 +55,10 @@ class Perception {
   Perception(const Perception&) = delete;
   Perception& operator=(const Perception&) = delete;
 
-  /// Takes an image of a camera. `time`: when it was captured [s], on the clock of Controller::step. The arm was where the controller's
-  /// history says, or at q (nv), unless empty. Throws std::invalid_argument that names the value and what is allowed.
-  PerceptionReport update(const std::string& camera, const RawDepth& depth, double time, const Eigen::VectorXd& q = {});
+  /// Takes an image of a camera. Throws std::invalid_argument that names the value and what is allowed.
+  PerceptionReport update(const std::string& camera, const RawDepth& depth, const Capture& capture);
   /// The same of points (3 × N) in the camera's optical frame [m].
-  PerceptionReport update(const std::string& camera, const Eigen::Matrix3Xd& points, double time, const Eigen::VectorXd& q = {});
+  PerceptionReport update(const std::string& camera, const Eigen::Matrix3Xd& points, const Capture& capture);
 
   /// What is within `grow` [m] of these balls is no obstacle: what is to be grasped, or a place where noise is known. In the world, or on
   /// a link (frame) of the arm, at the time of capture. Replaces a region of the same name.
@@ -75,12 +81,12 @@ class Perception {
 
   /// An obstacle as it was handed to the controller.
   struct Cell {
-    Eigen::Vector3d centre;   ///< [m] in the world
-    double radius;            ///< [m]
-    int camera;               ///< that showed it last
-    double age;               ///< since it was shown last, at the last image of any camera [s]
-    bool is_remembered;       ///< no camera shows it now
-    bool is_hidden;           ///< something is in front of it
+    Eigen::Vector3d centre;  ///< [m] in the world
+    double radius;           ///< [m]
+    int camera;              ///< that showed it last
+    double age;              ///< since it was shown last, at the last image of any camera [s]
+    bool is_remembered;      ///< no camera shows it now
+    bool is_hidden;          ///< something is in front of it
   };
   std::vector<Cell> cells() const;
   /// Middles (3 × N) of cells where nobody has looked and that border on seen space [m].

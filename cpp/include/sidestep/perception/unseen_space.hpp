@@ -29,7 +29,9 @@ class UnseenSpace {
 
  private:
   std::size_t index(int i, int j, int k) const noexcept {
-    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(i);
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(side_) +
+           static_cast<std::size_t>(i);
   }
   Eigen::Vector3d middle(int i, int j, int k) const noexcept {
     return corner_ + edge_ * Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5);

@@ -12,7 +12,8 @@ namespace sidestep {
 class VoxelGrid {
  public:
   static constexpr int num_levels = 3;
-  static constexpr std::array<double, num_levels> scales{1.0, 1.5, 2.5};  ///< Edges of the levels' cells, in those of the first.
+  static constexpr std::array<double, num_levels> scales{1.0, 1.5,
+                                                         2.5};  ///< Edges of the levels' cells, in those of the first.
 
   /// Cells of the edge `voxel` [m] up to `fine` [m] from the centre along each axis, coarser ones up to `far` [m].
   VoxelGrid(const Eigen::Vector3d& centre, double fine, double far, double voxel);
@@ -23,7 +24,8 @@ class VoxelGrid {
     const float away = std::fmax(std::fabs(x), std::fmax(std::fabs(y), std::fabs(z)));
     for (const Level& level : levels_) {
       if (away < level.half) {
-        const int i = static_cast<int>((x + level.half) * level.per_metre), j = static_cast<int>((y + level.half) * level.per_metre),
+        const int i = static_cast<int>((x + level.half) * level.per_metre),
+                  j = static_cast<int>((y + level.half) * level.per_metre),
                   k = static_cast<int>((z + level.half) * level.per_metre);
         return level.begin + (k * level.side + j) * level.side + i;
       }

@@ -15,17 +15,17 @@ namespace sidestep {
 
 /// A cell in which something was seen.
 struct Voxel {
-  float low[3], high[3];            ///< Box of what is in it [m], in the world.
+  float low[3], high[3];              ///< Box of what is in it [m], in the world.
   float frame_low[3], frame_high[3];  ///< The same of the last image that showed it.
-  float error;                      ///< By how much what is in it may be elsewhere [m]: calibration of its camera, there.
-  double first, last;               ///< Times of the first and the last image that showed it [s].
-  std::uint32_t frame;              ///< Number of that image.
-  int cell;                         ///< In the grid; -1: the voxel is not in use.
-  int pixels;                       ///< Number of pixels of that image that showed it.
-  std::uint8_t camera;              ///< Camera that showed it last.
-  std::uint8_t free_images;         ///< Images in a row that saw through it.
-  bool counts;                      ///< It is an obstacle; else a second image must show it.
-  bool is_hidden;                   ///< The last image that could have shown it did not, since something is in front of it.
+  float error;                        ///< By how much what is in it may be elsewhere [m]: calibration of its camera, there.
+  double first, last;                 ///< Times of the first and the last image that showed it [s].
+  std::uint32_t frame;                ///< Number of that image.
+  int cell;                           ///< In the grid; -1: the voxel is not in use.
+  int pixels;                         ///< Number of pixels of that image that showed it.
+  std::uint8_t camera;                ///< Camera that showed it last.
+  std::uint8_t free_images;           ///< Images in a row that saw through it.
+  bool counts;                        ///< It is an obstacle; else a second image must show it.
+  bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 };
 
 /// An image with all that says what its rays have seen.
@@ -94,8 +94,8 @@ class VoxelMap {
   VoxelGrid grid_;
   std::vector<int> index_;  // Index of the voxel of each cell; -1: none.
   std::vector<Voxel> voxels_;
-  std::vector<int> unused_;   // Indices of voxels that are not in use.
-  std::vector<int> touched_;  // Indices of those that the image showed.
+  std::vector<int> unused_;                   // Indices of voxels that are not in use.
+  std::vector<int> touched_;                  // Indices of those that the image showed.
   std::vector<float> row_x_, row_y_, row_z_;  // Points of a row of pixels [m], in the world.
   std::vector<int> row_cells_;                // Their cells.
   std::uint32_t frame_ = 0;

@@ -1,0 +1,21 @@
+"""The path from a depth image to the obstacles of a controller; the core computes it."""
+
+from sidestep._core import (
+    ArmResidual,
+    DepthCamera,
+    DepthNoise,
+    Perception,
+    PerceptionReport,
+    PerceptionSettings,
+    PixelLabel,
+)
+
+__all__ = [
+    "ArmResidual",
+    "DepthCamera",
+    "DepthNoise",
+    "Perception",
+    "PerceptionReport",
+    "PerceptionSettings",
+    "PixelLabel",
+]
