@@ -1,3 +1,4 @@
+from . import perception as perception
 from ._core import Activity as Activity
 from ._core import Command as Command
 from ._core import Controller as Controller
@@ -11,7 +12,6 @@ from ._core import __version__ as __version__
 from ._core import integrate as integrate
 from ._core import integrate_batch as integrate_batch
 from ._core import replay as replay
-from . import perception as perception
 from .arm import Arm as Arm
 from .body import Body as Body
 from .distance import ExactClearance as ExactClearance

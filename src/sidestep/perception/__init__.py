@@ -1,4 +1,4 @@
-"""From depth images to obstacles: cameras, where their images come from, and the path from an image to the controller."""
+"""From depth images to obstacles: cameras, where their images come from, and what becomes of them."""
 
 import lazy_loader
 

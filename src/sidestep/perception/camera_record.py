@@ -72,7 +72,7 @@ class CameraRecord:
             object.__setattr__(self, "pose", checked_pose(self.pose, f"{owner}: pose"))
 
     def camera(self, **others: Any) -> DepthCamera:
-        """The camera of `Perception`; `others`: what a source does not know, such as pose, noise, far, translation_error.
+        """The camera of `Perception`; `others`: what a source does not know, such as pose, noise and far.
 
         Raises:
             ValueError: the pose is not known and not given.
