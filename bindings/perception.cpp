@@ -9,6 +9,7 @@
 #include "arguments.hpp"
 #include "module.hpp"
 #include "settings.hpp"
+#include "sidestep/perception/camera_check.hpp"
 #include "sidestep/perception/perception.hpp"
 
 namespace sidestep::python {
@@ -255,6 +256,45 @@ void bind_report(nb::module_& m) {
       .def_prop_ro("total_time", &R::total_time, "Sum of the times [s].");
 }
 
+void bind_check(nb::module_& m) {
+  using C = CameraCorrection;
+  nb::class_<C>(m, "CameraCorrection", "Where a camera is and how its clock goes, as the arm in its images says.")
+      .def_prop_ro("pose", [](const C& c) { return to_numpy_matrix(c.pose.matrix()); }, "Pose (4, 4) in the world, or on its link, that fits best.")
+      .def_ro("translation", &C::translation, "By which it differs from what was told [m].")
+      .def_ro("rotation", &C::rotation, "The same [rad].")
+      .def_ro("clock_offset", &C::clock_offset, "To add to the times of images [s]; nan: not known, the arm does not move enough.")
+      .def_ro("rms_before", &C::rms_before, "Distance of points from the surface of the arm before [m], robust.")
+      .def_ro("rms_after", &C::rms_after, "The same afterwards [m].")
+      .def_ro("overshoot", &C::overshoot, "By which the cover is larger than the arm, where it was seen [m]: taken off.")
+      .def_ro("translation_spread", &C::translation_spread, "Half the difference of what each second image alone says [m].")
+      .def_ro("rotation_spread", &C::rotation_spread, "The same [rad].")
+      .def_ro("clock_spread", &C::clock_spread, "The same of the clock offset [s].")
+      .def_ro("images", &C::images, "Number of images that show the arm.")
+      .def_ro("points", &C::points, "Number of points near it.")
+      .def_ro("question", &C::question, "What is hard to believe, in words; empty: nothing.");
+  nb::class_<CameraCheck>(m, "CameraCheck",
+                          "Measures pose and clock offset of a camera from the arm that moves in view.\n\n"
+                          "Minimises the robust sum of the distances |d(X_WC p, q(t + tau)) + o| of points p of the images from the surface of the arm\n"
+                          "over the pose X_WC and the clock offset tau; d is the distance to the covering ellipsoids, o the overshoot of the link's cover.")
+      .def(nb::init<const Arm&, const DepthCamera&>(), nb::arg("arm"), nb::arg("camera"))
+      .def("add_state", [](CameraCheck& self, nb::handle q, nb::handle time) { self.add_state(as_capture_time(time), as_finite_vector(q, "q")); },
+           nb::arg("q"), nb::kw_only(), nb::arg("time"), nb::sig("def add_state(self, q: numpy.typing.ArrayLike, *, time: float) -> None"),
+           "The arm was at q (nv,) at a time [s], later than the last one.")
+      .def("add",
+           [](CameraCheck& self, nb::handle depth, nb::handle time, nb::handle unit) {
+             const Pixels pixels = as_depth(depth, self.camera(), unit);
+             self.add(pixels.raw, as_capture_time(time));
+           },
+           nb::arg("depth"), nb::kw_only(), nb::arg("time"), nb::arg("unit") = nb::none(),
+           nb::sig("def add(self, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None) -> None"),
+           "An image (height, width), captured at a time [s]; as for Perception.update.")
+      .def("solve", [](const CameraCheck& self) {
+             const nb::gil_scoped_release release;
+             return self.solve();
+           },
+           "Raises RuntimeError where fewer than three images show the arm near where it should be.");
+}
+
 nb::dict cells_of(const Perception& self) {
   const std::vector<Perception::Cell> cells = self.cells();
   const auto num = static_cast<Eigen::Index>(cells.size());
@@ -284,6 +324,7 @@ nb::dict cells_of(const Perception& self) {
 void bind_perception(nb::module_& m) {
   bind_camera(m);
   bind_report(m);
+  bind_check(m);
   bind_settings<PerceptionSettings>(m, "PerceptionSettings", "How what cameras see becomes obstacles.");
   nb::class_<Perception>(m, "Perception",
                          "From depth cameras to the obstacles of a controller: takes the arm out of the image, remembers what is hidden, and hands\n"

@@ -6,6 +6,8 @@ from .folder_writer import FolderWriter as FolderWriter
 from .frame import Frame as Frame
 from .image_file import read_depth_png as read_depth_png
 from .pipeline import ArmResidual as ArmResidual
+from .pipeline import CameraCheck as CameraCheck
+from .pipeline import CameraCorrection as CameraCorrection
 from .pipeline import DepthCamera as DepthCamera
 from .pipeline import DepthNoise as DepthNoise
 from .pipeline import Perception as Perception

@@ -2,6 +2,8 @@
 
 from sidestep._core import (
     ArmResidual,
+    CameraCheck,
+    CameraCorrection,
     DepthCamera,
     DepthNoise,
     Perception,
@@ -12,6 +14,8 @@ from sidestep._core import (
 
 __all__ = [
     "ArmResidual",
+    "CameraCheck",
+    "CameraCorrection",
     "DepthCamera",
     "DepthNoise",
     "Perception",
