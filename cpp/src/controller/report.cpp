@@ -18,15 +18,15 @@ double within_limits(double q, double lower, double upper, bool slides) noexcept
   return std::abs(q - within) < (slides ? prismatic_noise : position_noise) ? within : q;
 }
 
-SafetyStatus safety_of(TorqueStatus program) noexcept {
+SafetyStatus safety_of(ProgramStatus program) noexcept {
   switch (program) {
-    case TorqueStatus::ok: return SafetyStatus::ok;
-    case TorqueStatus::limited: return SafetyStatus::limited;
-    case TorqueStatus::relaxed: return SafetyStatus::relaxed;
-    case TorqueStatus::relaxed_safety: return SafetyStatus::margin_lost;
-    case TorqueStatus::clearance_lost: return SafetyStatus::clearance_lost;
-    case TorqueStatus::fallback_invalid_input:
-    case TorqueStatus::fallback_solver: break;
+    case ProgramStatus::ok: return SafetyStatus::ok;
+    case ProgramStatus::limited: return SafetyStatus::limited;
+    case ProgramStatus::relaxed: return SafetyStatus::relaxed;
+    case ProgramStatus::relaxed_safety: return SafetyStatus::margin_lost;
+    case ProgramStatus::clearance_lost: return SafetyStatus::clearance_lost;
+    case ProgramStatus::fallback_invalid_input:
+    case ProgramStatus::fallback_solver: break;
   }
   return SafetyStatus::stopping;
 }

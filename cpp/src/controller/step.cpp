@@ -48,7 +48,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
   state_.program = guard(solve(state_.wanted, apart, followed, told, tick), tick);
   reference_.advance(solution_.acceleration,
-                     state_.program == TorqueStatus::relaxed_safety || state_.program == TorqueStatus::clearance_lost,
+                     state_.program == ProgramStatus::relaxed_safety || state_.program == ProgramStatus::clearance_lost,
                      model.arm.robot().limits().jerk, tick.period);
 
   // Command = tracker(...)
@@ -236,8 +236,8 @@ Lead Controller::Impl::lead(const Goal& followed, bool stale, const Tick& tick) 
           slows_itself ? 1.0 : pace(tick), stale || !measured_.agrees_with_reference()};
 }
 
-TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
-                                     const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
+                                      const Tick& tick) noexcept {
   SecondState second;
   if (apart && attractor_.look_at_arm(measured_.position(), measured_.velocity(), sources_.obstacles(), sources_.closing())) {
     second = {&attractor_.arm_clearances(), &measured_.velocity()};
@@ -258,15 +258,15 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     dynamics_.update(at_reference, !apart || !dynamics_.has_model() ? told : ToldDynamics{});
   }
-  const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
-                                             last, tick, solution_, speed_.at_reference());
+  const ProgramStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
+                                              last, tick, solution_, speed_.at_reference());
   if (model.torque) {
     reference_.torque = solution_.torque;
   }
   return status;
 }
 
-TorqueStatus Controller::Impl::guard(TorqueStatus solved, const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::guard(ProgramStatus solved, const Tick& tick) noexcept {
   // Beside what moves a stop would only wait for it; and the way out of what is lost comes before the jerk.
   if (sources_.has_movers() || look_ahead_.is_followed() || solution_.least_clearance < 0.0 ||
       !solution_.acceleration.allFinite()) {
@@ -284,11 +284,11 @@ TorqueStatus Controller::Impl::guard(TorqueStatus solved, const Tick& tick) noex
     torque.of(solution_.acceleration, solution_.torque);
     reference_.torque = solution_.torque;
   }
-  return TorqueStatus::limited;
+  return ProgramStatus::limited;
 }
 
-TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
-                                     const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::track(ProgramStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
+                                      const Tick& tick) noexcept {
   if (!apart || tracker_.drives_track()) {
     tracker_.follow(solution_);
     return solved;
@@ -311,8 +311,8 @@ const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const 
     static_cast<void>(program_.solve(reference_.q, reference_.v, state_.wanted, dynamics_, nullptr, {},
                                      LastCommand{&reference_.smooth_a}, tick, tracker_.solution()));
     solution_.acceleration = tracker_.solution().acceleration;
-    solution_.fault = q_known ? TorqueFault::velocity : TorqueFault::position;
-    state_.program = TorqueStatus::fallback_invalid_input;
+    solution_.fault = q_known ? ProgramFault::velocity : ProgramFault::position;
+    state_.program = ProgramStatus::fallback_invalid_input;
     guard_.reset();
     reference_.advance(solution_.acceleration, false, model.arm.robot().limits().jerk, tick.period);
   } else {
@@ -324,7 +324,7 @@ const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const 
     }
     state_.program = program_.stop(is_impossible ? ConstVectorRef(none) : q, is_impossible ? ConstVectorRef(none) : v,
                                    state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, tick, solution_);
-    state_.program = std::max(state_.program, TorqueStatus::fallback_invalid_input);
+    state_.program = std::max(state_.program, ProgramStatus::fallback_invalid_input);
     tracker_.follow(solution_);
   }
   report_stop(tick);

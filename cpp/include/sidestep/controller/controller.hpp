@@ -200,9 +200,9 @@ class Controller {
   /// How the geometric system ended in the last step.
   StepStatus attraction_status() const noexcept;
   /// How the quadratic program ended in the last step.
-  TorqueStatus program_status() const noexcept;
+  ProgramStatus program_status() const noexcept;
   /// The quadratic program's solution of the last step.
-  const TorqueSolution& solution() const noexcept;
+  const MotionSolution& solution() const noexcept;
   /// The target configuration: the goal, or the posture of a pose goal; empty if none is known. Only for the thread of
   /// `step`; allocates.
   Eigen::VectorXd target() const;
