@@ -3519,12 +3519,6 @@ class Controller:
         """(m,) psi of every coordinate at the last step, see labels."""
 
     @property
-    def program_status(self) -> ProgramStatus:
-        """
-        How the quadratic program ended in the last step, for tests and studies; `command.status` is what counts.
-        """
-
-    @property
     def geometric_step(self) -> Step:
         """
         The Step of the geometric system in the last step, with its clearances, metric and diagnosis.
@@ -3616,6 +3610,11 @@ class Controller:
         """
         What is believed of each source, a SourceState each, as of the last step. For the thread of `step`.
         """
+
+def program_status(controller: Controller) -> ProgramStatus:
+    """
+    How the quadratic program ended in the last step, for tests; `command.status` is what counts.
+    """
 
 def looks_like_degrees(angle: float) -> bool:
     """

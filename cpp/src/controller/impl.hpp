@@ -70,9 +70,7 @@ class Controller::Impl {
   const Tick& tick() const noexcept { return clock_.tick(); }
   const MeasuredState& measured() const noexcept { return measured_; }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
-  StepStatus attraction_status() const noexcept { return state_.attraction; }
-  ProgramStatus program_status() const noexcept { return state_.program; }
-  const MotionSolution& solution() const noexcept { return solution_; }
+  detail::PartResults part_results() const noexcept { return {state_.attraction, state_.program, solution_}; }
 
   // Before the first step.
   /// Takes over the requests of another one whose arm has the same joints.

@@ -8,6 +8,7 @@
 
 namespace sidestep {
 
+/// @cond internal
 /// How a solve ended, from best to worst. The command is safe to send after every one of them.
 enum class ProgramStatus {
   ok,                      ///< The wanted acceleration is tracked, and no limit is in the way.
@@ -26,6 +27,7 @@ enum class ProgramFault { none, position, velocity, acceleration, mass_matrix, b
 /// Short names, for example "limited", "mass_matrix".
 const char* name(ProgramStatus status) noexcept;
 const char* name(ProgramFault fault) noexcept;
+/// @endcond
 
 /// Effect of one clearance on a solve.
 struct SafetyRow {
