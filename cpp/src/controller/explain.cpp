@@ -120,7 +120,7 @@ std::string Controller::Impl::explain_way() const {
     return text + explain_start(model.arm.robot(), goal.planner()->last_plan().obstruction);
   }
   const std::string at_target = explain_target(model, board_, inputs_, sources_);
-  if (planner_status == OnlinePlannerStatus::goal_in_collision || goal.stops_short(state_.followed)) {
+  if (planner_status == OnlinePlannerStatus::goal_in_collision || goal.stops_short(state_.followed, state_.findings.blocked)) {
     return text + at_target;
   }
   if (!at_target.empty()) {

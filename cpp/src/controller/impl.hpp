@@ -109,6 +109,7 @@ class Controller::Impl {
     StepStatus attraction = StepStatus::invalid_state;              // how the attractor ended
     ProgramStatus program = ProgramStatus::fallback_invalid_input;  // how the program ended
     Eigen::VectorXd wanted, coupling;  // accelerations: after barriers, and to an arm that cannot follow
+    TargetFindings findings;           // Findings for the next step.
     Places places;                     // Configurations near which activation distances shrink.
   };
 

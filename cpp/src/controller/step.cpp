@@ -33,6 +33,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const NearReference near = near_reference();
   const InputsStage::Target target = inputs_.target(moment(near, tick));
   const Goal& followed = *(state_.followed = target.followed);
+  state_.findings = target.findings;
   taken_.goal = inputs_.goal().taken();
   if (target.is_another_way) {
     activity_.forget(time);
@@ -41,8 +42,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   look_ahead(followed, tick, obstacles);
 
   // Desired = attractor(Target, World)
-  state_.attraction =
-      attractor_.attract(lead(followed, must_rest(), tick), reference_, obstacles, sources_.closing(), tick, state_.wanted);
+  state_.attraction = attractor_.attract(lead(followed, must_rest(), tick), distances_.values(), reference_, obstacles,
+                                         sources_.closing(), tick, state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
@@ -85,6 +86,7 @@ void Controller::Impl::take_over(const Tick& tick) noexcept {
   }
   if (inputs_.update(tick)) {
     distances_.forget();
+    state_.findings = {};
     if (inputs_.request().goal() == nullptr) {
       activity_.forget(tick.time);
     }
@@ -143,6 +145,7 @@ void Controller::Impl::begin_motion() noexcept {
     inputs_.begin_anew();
     look_ahead_.begin_anew();
     distances_.forget();
+    state_.findings = {};
     tracker_.begin_anew();
     state_.next_look = 0.0;
   }
@@ -150,12 +153,12 @@ void Controller::Impl::begin_motion() noexcept {
 
 InputsStage::Moment Controller::Impl::moment(const NearReference& near, const Tick& tick) const noexcept {
   return {
-      reference_,  measured_.position(),     sources_.obstacles(), near, tick, pace(tick), measured_.agrees_with_reference(),
-      must_rest(), look_ahead_.is_followed()};
+      reference_,  measured_.position(),      sources_.obstacles(), near, tick, pace(tick), measured_.agrees_with_reference(),
+      must_rest(), look_ahead_.is_followed(), state_.findings};
 }
 
 void Controller::Impl::update_activation_distances(bool looks, const Obstacles& obstacles) noexcept {
-  GoalFollower& goal = inputs_.goal();
+  const GoalFollower& goal = inputs_.goal();
   if (looks) {
     sources_.look_for_movers(reference_.q);
     if (obstacles.tree().moves()) {
@@ -167,22 +170,20 @@ void Controller::Impl::update_activation_distances(bool looks, const Obstacles& 
   }
   if (sources_.has_movers() || !goal.is_led_to_target()) {
     if (looks) {
-      distances_.reset(attractor_.activations());
+      distances_.take(model.system->activations());
     }
   } else if (model.settings.synchronous) {
     if (looks) {
       goal.write_places(state_.places);
-      bool blocked = goal.target_is_blocked();
-      distances_.update(state_.places, obstacles, attractor_.activations(), blocked);
-      goal.set_target_blocked(blocked);
+      distances_.update(state_.places, obstacles, state_.findings.blocked);
     }
   } else {
     taken_.activations = worker_.activations().update() ? &worker_.activations().current() : nullptr;
     if (taken_.activations != nullptr || looks) {
       const FoundActivations& found = worker_.activations().current();
       const bool ours = found.request_number == inputs_.request().number() && found.posture_attempt == goal.attempt();
-      attractor_.activations() = ours ? found.values : model.system->activations();
-      goal.set_target_blocked(ours && found.target_blocked);
+      distances_.take(ours ? found.values : model.system->activations());
+      state_.findings.blocked = ours && found.target_blocked;
     }
   }
 }
