@@ -234,25 +234,25 @@ void bind_safety(nb::module_& m) {
 }
 
 void bind_motion_status(nb::module_& m) {
-  nb::enum_<TorqueStatus>(m, "TorqueStatus", "How a control step ended, from best to worst.")
-      .value("ok", TorqueStatus::ok, "tracked, no limit in the way")
-      .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
-      .value("relaxed", TorqueStatus::relaxed, "limits of jerk, joint or Cartesian speed, or acceleration gave way")
-      .value("relaxed_safety", TorqueStatus::relaxed_safety, "not all clearances and position limits can be kept")
-      .value("clearance_lost", TorqueStatus::clearance_lost, "the least clearance is below zero, whatever the rest")
-      .value("fallback_invalid_input", TorqueStatus::fallback_invalid_input, "unusable input, damped stop")
-      .value("fallback_solver", TorqueStatus::fallback_solver, "program not solved, damped stop")
-      .def("__str__", [](TorqueStatus status) { return name(status); })
-      .def_prop_ro("is_fallback", [](TorqueStatus s) { return s >= TorqueStatus::fallback_invalid_input; });
-  nb::enum_<TorqueFault>(m, "TorqueFault", "Which input of a control step is unusable.")
-      .value("none", TorqueFault::none)
-      .value("position", TorqueFault::position)
-      .value("velocity", TorqueFault::velocity)
-      .value("acceleration", TorqueFault::acceleration)
-      .value("mass_matrix", TorqueFault::mass_matrix)
-      .value("bias", TorqueFault::bias)
-      .value("clearances", TorqueFault::clearances)
-      .def("__str__", [](TorqueFault fault) { return name(fault); });
+  nb::enum_<ProgramStatus>(m, "ProgramStatus", "How a solve of MotionProgram ended, from best to worst.")
+      .value("ok", ProgramStatus::ok, "tracked, no limit in the way")
+      .value("limited", ProgramStatus::limited, "optimal, with a limit in the way")
+      .value("relaxed", ProgramStatus::relaxed, "limits of jerk, joint or Cartesian speed, or acceleration gave way")
+      .value("relaxed_safety", ProgramStatus::relaxed_safety, "not all clearances and position limits can be kept")
+      .value("clearance_lost", ProgramStatus::clearance_lost, "the least clearance is below zero, whatever the rest")
+      .value("fallback_invalid_input", ProgramStatus::fallback_invalid_input, "unusable input, damped stop")
+      .value("fallback_solver", ProgramStatus::fallback_solver, "program not solved, damped stop")
+      .def("__str__", [](ProgramStatus status) { return name(status); })
+      .def_prop_ro("is_fallback", [](ProgramStatus s) { return s >= ProgramStatus::fallback_invalid_input; });
+  nb::enum_<ProgramFault>(m, "ProgramFault", "Which input of a solve is unusable.")
+      .value("none", ProgramFault::none)
+      .value("position", ProgramFault::position)
+      .value("velocity", ProgramFault::velocity)
+      .value("acceleration", ProgramFault::acceleration)
+      .value("mass_matrix", ProgramFault::mass_matrix)
+      .value("bias", ProgramFault::bias)
+      .value("clearances", ProgramFault::clearances)
+      .def("__str__", [](ProgramFault fault) { return name(fault); });
 }
 
 void bind_motion_solution(nb::module_& m) {
@@ -265,38 +265,38 @@ void bind_motion_solution(nb::module_& m) {
       .def_ro("slack", &SafetyRow::slack, "By how much the solution falls short of it [m/s^2].")
       .def_ro("multiplier", &SafetyRow::multiplier, "What the row costs the task, >= 0; the largest one dominates.");
 
-  nb::class_<TorqueSolution>(m, "TorqueSolution", "What one control step gives.")
-      .def_ro("status", &TorqueSolution::status, "How the control step ended.")
-      .def_ro("fault", &TorqueSolution::fault, "Which input is unusable.")
-      .def_prop_ro("torque", [](const TorqueSolution& s) { return to_numpy(s.torque); },
+  nb::class_<MotionSolution>(m, "MotionSolution", "What a solve of MotionProgram gives.")
+      .def_ro("status", &MotionSolution::status, "How the solve ended.")
+      .def_ro("fault", &MotionSolution::fault, "Which input is unusable.")
+      .def_prop_ro("torque", [](const MotionSolution& s) { return to_numpy(s.torque); },
                    "(nv,) [Nm | N], within the effort limits, always finite.")
-      .def_prop_ro("acceleration", [](const TorqueSolution& s) { return to_numpy(s.acceleration); },
+      .def_prop_ro("acceleration", [](const MotionSolution& s) { return to_numpy(s.acceleration); },
                    "(nv,) [/s^2] that the torque gives; NaN where M or the bias is unusable.")
-      .def_prop_ro("slack", [](const TorqueSolution& s) { return to_numpy(s.slack); },
+      .def_prop_ro("slack", [](const MotionSolution& s) { return to_numpy(s.slack); },
                    "(nv,) [/s^2] signed acceleration beyond its bounds; 0 unless relaxed.")
-      .def_prop_ro("lower", [](const TorqueSolution& s) { return to_numpy(s.lower); },
+      .def_prop_ro("lower", [](const MotionSolution& s) { return to_numpy(s.lower); },
                    "(nv,) [/s^2] lower acceleration bounds.")
-      .def_prop_ro("upper", [](const TorqueSolution& s) { return to_numpy(s.upper); },
+      .def_prop_ro("upper", [](const MotionSolution& s) { return to_numpy(s.upper); },
                    "(nv,) [/s^2] upper acceleration bounds.")
-      .def_prop_ro("active", [](const TorqueSolution& s) { return nb::tuple(nb::cast(s.active)); },
+      .def_prop_ro("active", [](const MotionSolution& s) { return nb::tuple(nb::cast(s.active)); },
                    nb::sig("def active(self) -> tuple[Limit, ...]"), "The limits in the way of each joint.")
       .def_prop_ro("safety",
-                   [](const TorqueSolution& s) {
+                   [](const MotionSolution& s) {
                      const auto first = s.safety.begin();
                      return nb::tuple(nb::cast(std::vector<SafetyRow>(first, first + s.num_safety_rows)));
                    },
                    nb::sig("def safety(self) -> tuple[SafetyRow, ...]"),
                    "The clearances that were considered, most critical first.")
       .def_prop_ro("dominant",
-                   [](const TorqueSolution& s) -> nb::object {
+                   [](const MotionSolution& s) -> nb::object {
                      return s.dominant < 0 ? nb::none() : nb::cast(s.safety[static_cast<std::size_t>(s.dominant)]);
                    },
                    nb::sig("def dominant(self) -> SafetyRow | None"),
                    "The clearance that bends the motion most; None if none does.")
-      .def_ro("least_clearance", &TorqueSolution::least_clearance,
+      .def_ro("least_clearance", &MotionSolution::least_clearance,
               "The least clearance given [m], exact, with a row or without; inf if there is none.")
-      .def_ro("least_coordinate", &TorqueSolution::least_coordinate, "Which clearance that is; -1 if there is none.")
-      .def_ro("least_nearest", &TorqueSolution::least_nearest, "Its nearest obstacle point; -1 if there is none.");
+      .def_ro("least_coordinate", &MotionSolution::least_coordinate, "Which clearance that is; -1 if there is none.")
+      .def_ro("least_nearest", &MotionSolution::least_nearest, "Its nearest obstacle point; -1 if there is none.");
 }
 
 void make_motion_program(MotionProgram* self, const Robot& robot, double period, bool by_torque, const ArrayLike& tracking_weight,
@@ -319,7 +319,7 @@ void make_motion_program(MotionProgram* self, const Robot& robot, double period,
   new (self) MotionProgram(robot, std::move(settings));
 }
 
-TorqueSolution solve_motion_program(MotionProgram& program, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,
+MotionSolution solve_motion_program(MotionProgram& program, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,
                                     const std::optional<ArrayLike>& mass_matrix, const std::optional<ArrayLike>& bias,
                                     nb::handle clearances, const std::optional<ArrayLike>& last_acceleration,
                                     const std::optional<ArrayLike>& last_torque) {
@@ -327,7 +327,7 @@ TorqueSolution solve_motion_program(MotionProgram& program, const ArrayLike& q, 
   if (program.settings().by_torque && !(mass_matrix && bias)) {
     throw nb::value_error("mass_matrix and bias must be given to an arm that is moved by torque");
   }
-  TorqueSolution solution(nv, program.settings().safety.max_rows);
+  MotionSolution solution(nv, program.settings().safety.max_rows);
   nb::object keep;
   LastCommand last;
   Eigen::VectorXd a, torque, h;
@@ -385,11 +385,11 @@ void bind_motion_program(nb::module_& m) {
                   "acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, "
                   "bias: numpy.typing.ArrayLike | None = None, *, clearances: Clearances | Step | None = None, "
                   "last_acceleration: numpy.typing.ArrayLike | None = None, "
-                  "last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution"),
+                  "last_torque: numpy.typing.ArrayLike | None = None) -> MotionSolution"),
           "One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),\n"
           "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity; both only if by_torque), clearances at (q, v), which a Step\n"
           "has. With the last period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits.\n"
-          "Returns a TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on\n"
+          "Returns a MotionSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on\n"
           "wrong shapes.")
       .def_prop_ro("period", [](const MotionProgram& p) { return p.settings().period; }, "[s] between two calls.")
       .def_prop_ro("by_torque", [](const MotionProgram& p) { return p.settings().by_torque; }, "Whether the arm is moved by torque.")

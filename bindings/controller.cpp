@@ -461,12 +461,10 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
       .def_prop_ro("values", of_last_step([](const Controller& self) { return to_numpy(self.workspace().values); }),
                    "(m,) psi of every coordinate at the last step, see labels.")
-      .def_prop_ro("program_status", of_last_step([](const Controller& self) { return self.program_status(); }),
-                   "How the quadratic program ended in the last step, for tests and studies; `command.status` is what counts.")
       .def_prop_ro(
           "geometric_step",
           of_last_step([](const Controller& self) {
-            return Step{self.attraction_status(), self.workspace(),
+            return Step{self.part_results().attraction, self.workspace(),
                         Explanation(self.system(), self.system().diagnose(self.workspace()), self.obstacles())};
           }),
           "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")
@@ -495,6 +493,8 @@ void bind_controller(nb::module_& m) {
         return "Controller(arm '" + self.arm().name() + "', " + std::to_string(self.num_coordinates()) + " coordinates)";
       });
 
+  m.def("program_status", of_last_step([](const Controller& self) { return self.part_results().program; }), nb::arg("controller"),
+        "How the quadratic program ended in the last step, for tests; `command.status` is what counts.");
   m.def("looks_like_degrees", &looks_like_degrees, nb::arg("angle"),
         "Whether an angle [rad] is implausible in radians and plausible in degrees: more than one and a half turns, at most\n"
         "three in degrees, and not a whole number of quarter turns.");

@@ -1,5 +1,6 @@
 """The counts of .ci/structure on small samples, where they can be counted by hand."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -228,4 +229,7 @@ def test_the_script_counts_this_checkout(tmp_path):
         [sys.executable, SCRIPT, "--json", file], capture_output=True, text=True, check=True, timeout=120
     )
     assert "members of the largest struct" in done.stdout
-    assert "methods without parameters that may write" in file.read_text()
+    counts = json.loads(file.read_text())
+    assert "methods without parameters that may write" in counts
+    assert counts["enums of results in public modules"] == ["Activity", "SafetyStatus"]
+    assert counts["enums of results in the C++ reference"] == ["Activity", "PlanStatus", "SafetyStatus"]

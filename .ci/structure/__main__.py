@@ -26,6 +26,9 @@ EXAMPLES = {
     "shape": r"(?<!nb::)[Cc]apsule",
     "setting": r"\bdrift_gain\b",
 }
+# Names of enums that say how something ended or stands, and what Doxygen leaves out.
+RESULT = re.compile(r"(Status|Fault|State|Activity)$")
+INTERNAL = re.compile(r"^ *//[/!] @cond internal\n.*?^ *//[/!] @endcond\n", re.DOTALL | re.MULTILINE)
 
 
 def count(checkout: Checkout) -> dict[str, Any]:
@@ -43,6 +46,7 @@ def count(checkout: Checkout) -> dict[str, Any]:
         "enums of the Python package": _bound_enums(checkout),
         "enums in public headers": _public_enums(checkout),
         "enums of results in public modules": _result_enums(checkout),
+        "enums of results in the C++ reference": _reference_enums(checkout),
         **{f"files that know the {kind}": checkout.that_know(pattern) for kind, pattern in EXAMPLES.items()},
         "code lines of the core": sum(map(cpp_tokens.code_lines, checkout.core)),
         "code lines of the bindings": sum(map(cpp_tokens.code_lines, checkout.bindings)),
@@ -131,19 +135,29 @@ def _bound_enums(checkout: Checkout) -> list[str]:
     return sorted(re.findall(r'nb::enum_<[\w:]+>\(\s*\w+,\s*"(\w+)"', text))
 
 
+def _public_headers(checkout: Checkout) -> list[Path]:
+    return [path for path in checkout.core if checkout.name(path).startswith("cpp/include/")]
+
+
 def _public_enums(checkout: Checkout) -> list[str]:
-    headers = [path for path in checkout.core if checkout.name(path).startswith("cpp/include/")]
-    return sorted(name for path in headers for name in checkout.read[path].enums)
+    return sorted(name for path in _public_headers(checkout) for name in checkout.read[path].enums)
+
+
+def _reference_enums(checkout: Checkout) -> list[str]:
+    """Enums of results in public headers, without what Doxygen is told to leave out."""
+    texts = [path.read_text(encoding="utf-8") for path in _public_headers(checkout)]
+    names = [name for text in texts for name in cpp_code.read_text(INTERNAL.sub("", text)).enums]
+    return sorted(name for name in names if RESULT.search(name))
 
 
 def _result_enums(checkout: Checkout) -> list[str]:
-    """Bound enums that say how something ended or stands, and that a public module hands on."""
+    """Bound enums of results that a public module hands on."""
     faces = "".join(
         path.read_text(encoding="utf-8")
         for path in checkout.python
         if path.name in ("__init__.py", "__init__.pyi")
     )
-    results = [name for name in _bound_enums(checkout) if re.search(r"(Status|Fault|State|Activity)$", name)]
+    results = [name for name in _bound_enums(checkout) if RESULT.search(name)]
     return [name for name in results if re.search(rf"\b{name}\b", faces)]
 
 

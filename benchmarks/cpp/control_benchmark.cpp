@@ -23,7 +23,7 @@ template <class Solve>
 void time_rounds(Times& times, const std::string& kind, Solve&& solve) {
   for (int round = 0; round < num_rounds; ++round) {
     const auto start = std::chrono::steady_clock::now();
-    const TorqueStatus status = solve();
+    const ProgramStatus status = solve();
     const auto stop = std::chrono::steady_clock::now();
     if (round > 0) {  // the first one warms the caches
       times[kind + name(status)].push_back(std::chrono::duration<double, std::micro>(stop - start).count());
@@ -47,7 +47,7 @@ void print(Times& times) {
 void without_clearances() {
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram controller(test::serial_arm(limits));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   test::Random random(0);
   Times times;
   for (int k = 0; k < num_states; ++k) {
@@ -72,7 +72,7 @@ void with_clearances(int num) {
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram controller(test::serial_arm(limits));
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   test::Random random(1);
   Times times;
   char label[40];

@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   MotionProgramSettings without_torque;
   without_torque.by_torque = false;
   MotionProgram filter(robot, without_torque);
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   const Eigen::VectorXd goal = 0.5 * (robot.limits().lower + robot.limits().upper);
   std::vector<benchmarks::State> states = benchmarks::states(robot, 100, 0);
   if (cloud) {
@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
     if (filtered) {
       failures += filter.solve(
                       {.q = state.q, .v = state.v, .acceleration = workspace.acceleration, .clearances = &workspace.clearances},
-                      solution) == TorqueStatus::fallback_solver;
+                      solution) == ProgramStatus::fallback_solver;
     }
   }
   return failures == 0 ? 0 : 1;

@@ -1261,8 +1261,8 @@ class SafetySettings:
     @max_rows.setter
     def max_rows(self, value: int, /) -> None: ...
 
-class TorqueStatus(enum.Enum):
-    """How a control step ended, from best to worst."""
+class ProgramStatus(enum.Enum):
+    """How a solve of MotionProgram ended, from best to worst."""
 
     def __str__(self) -> str: ...
 
@@ -1290,8 +1290,8 @@ class TorqueStatus(enum.Enum):
     @property
     def is_fallback(self) -> bool: ...
 
-class TorqueFault(enum.Enum):
-    """Which input of a control step is unusable."""
+class ProgramFault(enum.Enum):
+    """Which input of a solve is unusable."""
 
     def __str__(self) -> str: ...
 
@@ -1338,15 +1338,15 @@ class SafetyRow:
     def multiplier(self) -> float:
         """What the row costs the task, >= 0; the largest one dominates."""
 
-class TorqueSolution:
-    """What one control step gives."""
+class MotionSolution:
+    """What a solve of MotionProgram gives."""
 
     @property
-    def status(self) -> TorqueStatus:
-        """How the control step ended."""
+    def status(self) -> ProgramStatus:
+        """How the solve ended."""
 
     @property
-    def fault(self) -> TorqueFault:
+    def fault(self) -> ProgramFault:
         """Which input is unusable."""
 
     @property
@@ -1417,12 +1417,12 @@ class MotionProgram:
         safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
         """
 
-    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, clearances: Clearances | Step | None = None, last_acceleration: numpy.typing.ArrayLike | None = None, last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution:
+    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, clearances: Clearances | Step | None = None, last_acceleration: numpy.typing.ArrayLike | None = None, last_torque: numpy.typing.ArrayLike | None = None) -> MotionSolution:
         """
         One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),
         bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity; both only if by_torque), clearances at (q, v), which a Step
         has. With the last period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits.
-        Returns a TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on
+        Returns a MotionSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on
         wrong shapes.
         """
 
@@ -1445,7 +1445,7 @@ class MotionProgram:
         [rad/s^2 | m/s^2]; rows without bounds are left out.
         """
 
-    def count(self, status: TorqueStatus) -> int:
+    def count(self, status: ProgramStatus) -> int:
         """Number of solves that ended with this status."""
 
 def integrate_batch(controllers: Sequence[Controller], q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goals: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0, threads: int = 0) -> list[MotionRecord]:
@@ -3519,12 +3519,6 @@ class Controller:
         """(m,) psi of every coordinate at the last step, see labels."""
 
     @property
-    def program_status(self) -> TorqueStatus:
-        """
-        How the quadratic program ended in the last step, for tests and studies; `command.status` is what counts.
-        """
-
-    @property
     def geometric_step(self) -> Step:
         """
         The Step of the geometric system in the last step, with its clearances, metric and diagnosis.
@@ -3616,6 +3610,11 @@ class Controller:
         """
         What is believed of each source, a SourceState each, as of the last step. For the thread of `step`.
         """
+
+def program_status(controller: Controller) -> ProgramStatus:
+    """
+    How the quadratic program ended in the last step, for tests; `command.status` is what counts.
+    """
 
 def looks_like_degrees(angle: float) -> bool:
     """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep._core import TorqueStatus
+from sidestep._core import ProgramStatus
 from sidestep.control import AccelerationFilter, Limit, MotionProgram, TorqueController
 
 ROBOTS = ["fr3", "panda", "ur5", "planar2"]
@@ -25,7 +25,7 @@ def test_holds_the_arm_against_gravity(robot):
         if np.any(np.abs(bias) > 0.9 * robot.limits.effort):
             continue
         solution = controller.solve(q, zero, zero, robot.mass_matrix(q), bias)
-        assert solution.status == TorqueStatus.ok
+        assert solution.status == ProgramStatus.ok
         # M R torque / Q: below 1e-6 of (5 kg m^2 * 100 Nm)/(100 Nm)^2, and the torque differs by M of that.
         assert np.max(np.abs(solution.acceleration)) < 1e-6
         np.testing.assert_allclose(solution.torque, bias, atol=1e-5)
@@ -48,11 +48,11 @@ def test_wild_demands_never_break_a_limit(robot):
         np.testing.assert_allclose(acceleration, solution.acceleration, atol=1e-7)
         v = v + 0.001 * acceleration
         q = q + 0.001 * v
-        if solution.status != TorqueStatus.relaxed:
+        if solution.status != ProgramStatus.relaxed:
             assert np.all(np.abs(v) <= limits.velocity + 1e-9)  # the error above, over one period
-        if controller.count(TorqueStatus.relaxed) == 0:
+        if controller.count(ProgramStatus.relaxed) == 0:
             assert np.all((q <= limits.upper + 1e-9) & (q >= limits.lower - 1e-9))
-    assert controller.count(TorqueStatus.limited) > 0
+    assert controller.count(ProgramStatus.limited) > 0
 
 
 def test_limits_in_the_way_are_named():
@@ -65,7 +65,7 @@ def test_limits_in_the_way_are_named():
         (1e6, Limit.torque_upper | Limit.acceleration_lower),
     ]:
         solution = MotionProgram(robot).solve(q, v, [demand, 0.0], mass, bias)
-        assert solution.status == TorqueStatus.limited
+        assert solution.status == ProgramStatus.limited
         assert str(solution.status) == "limited"
         assert solution.active == (Limit(0), expected)
         assert solution.torque[1] == robot.limits.effort[1]
@@ -86,14 +86,14 @@ def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
         "mass_matrix": robot.mass_matrix(robot.neutral),
         "bias": robot.bias(robot.neutral, v),
     }
-    assert controller.solve(*inputs.values()).status == TorqueStatus.ok
+    assert controller.solve(*inputs.values()).status == ProgramStatus.ok
     known_bias = inputs["bias"].copy()
     inputs[argument].flat[0] = bad
     solution = controller.solve(*inputs.values())
-    assert solution.status == TorqueStatus.fallback_invalid_input
+    assert solution.status == ProgramStatus.fallback_invalid_input
     assert solution.status.is_fallback
     assert str(solution.fault) == argument
-    assert controller.count(TorqueStatus.fallback_invalid_input) == 1
+    assert controller.count(ProgramStatus.fallback_invalid_input) == 1
     assert np.all(np.abs(solution.torque) <= robot.limits.effort)
     if argument == "velocity":  # nothing to damp: hold against gravity
         np.testing.assert_array_equal(solution.torque, known_bias)

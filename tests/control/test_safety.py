@@ -7,7 +7,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
-from sidestep._core import TorqueStatus
+from sidestep._core import ProgramStatus
 from sidestep.control import Clearances, MotionProgram, SafetySettings
 from sidestep.system import GeometricSystem
 
@@ -165,7 +165,7 @@ def test_what_is_reported() -> None:
     solution = MotionProgram(robot, by_torque=False).solve(
         [0, 0], [-0.18, -0.06], [-5.0, -5.0], clearances=clearances
     )
-    assert solution.status == TorqueStatus.limited
+    assert solution.status == ProgramStatus.limited
     (row,) = solution.safety
     assert (row.coordinate, row.nearest, row.slack) == (1, 7, 0.0)
     assert row.multiplier > 0.0

@@ -204,7 +204,7 @@ void ClearanceConstraints::append_stop(const PathStop& stop, const BrakingState&
 }
 
 void ClearanceConstraints::report(const Moment& now, const Bounds&, const RowBlock& rows, const Eigen::VectorXd& wanted,
-                                  TorqueSolution& solution) const noexcept {
+                                  MotionSolution& solution) const noexcept {
   solution.num_safety_rows = std::min(rows.size, static_cast<int>(solution.safety.size()));
   double largest = 0.0;
   for (int k = 0; k < solution.num_safety_rows; ++k) {
@@ -218,7 +218,7 @@ void ClearanceConstraints::report(const Moment& now, const Bounds&, const RowBlo
     }
   }
   if (now.found.lost()) {
-    solution.status = std::max(solution.status, TorqueStatus::clearance_lost);
+    solution.status = std::max(solution.status, ProgramStatus::clearance_lost);
   }
 }
 

@@ -95,10 +95,10 @@ void TorqueWindow::narrow(Eigen::Index i, double least, double most, Limit least
 }
 
 void Constraint::report(const Moment&, const Bounds&, const RowBlock& rows, const Eigen::VectorXd& wanted,
-                        TorqueSolution& solution) const noexcept {
+                        MotionSolution& solution) const noexcept {
   for (int k = 0; k < rows.size; ++k) {
     if (rows.priority == Priority::comfort && rows.shortfall(k, solution.acceleration, wanted.norm()) > 0.0) {
-      solution.status = std::max(solution.status, TorqueStatus::relaxed);
+      solution.status = std::max(solution.status, ProgramStatus::relaxed);
     }
   }
 }

@@ -12,7 +12,7 @@ namespace {
 constexpr double unlimited_stop_damping = 1.0;
 
 /// Clips joint i's torque to what effort and rate leave, and names the limit.
-void clip_torque(const DampedStop::State& state, Eigen::Index i, TorqueSolution& solution) noexcept {
+void clip_torque(const DampedStop::State& state, Eigen::Index i, MotionSolution& solution) noexcept {
   const double effort = state.limits.effort[i];
   double lower = -effort, upper = effort;
   if (state.last_torque != nullptr) {
@@ -33,7 +33,7 @@ void clip_torque(const DampedStop::State& state, Eigen::Index i, TorqueSolution&
 
 }  // namespace
 
-void DampedStop::apply(const State& state, TorqueSolution& solution) const noexcept {
+void DampedStop::apply(const State& state, MotionSolution& solution) const noexcept {
   const JointLimits& limits = state.limits;
   const Eigen::Index nv = solution.torque.size();
   solution.slack.setZero();

@@ -53,7 +53,7 @@ void HardProgram::write_torque(const Eigen::MatrixXd& mass, const TorqueWindow& 
 }
 
 bool HardProgram::solve(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth, const Bounds& bounds,
-                        std::vector<RowBlock>& blocks, TorqueSolution& solution) noexcept {
+                        std::vector<RowBlock>& blocks, MotionSolution& solution) noexcept {
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   data_.lower = lower;
   data_.upper = upper;

@@ -86,7 +86,7 @@ void JointLimitConstraint::widen_to_overruns(const Moment& now, Bounds& bounds) 
 }
 
 void JointLimitConstraint::report(const Moment& now, const Bounds& bounds, const RowBlock&, const Eigen::VectorXd&,
-                                  TorqueSolution& solution) const noexcept {
+                                  MotionSolution& solution) const noexcept {
   if (now.last.acceleration == nullptr || !now.last.binds) {
     return;
   }

@@ -104,7 +104,7 @@ MotionProgram::MotionProgram(const Robot& robot, MotionProgramSettings settings,
       wanted_(position_),
       bias_(position_) {}
 
-TorqueStatus MotionProgram::solve(const MotionRequest& request, TorqueSolution& solution) noexcept {
+ProgramStatus MotionProgram::solve(const MotionRequest& request, MotionSolution& solution) noexcept {
   Known known = take(request);
   const LastCommand& last = request.last;
   const BrakingTorque dynamics{mass_, mass_cholesky_, bias_};
@@ -130,13 +130,13 @@ TorqueStatus MotionProgram::solve(const MotionRequest& request, TorqueSolution& 
     known.constraints = constraint->usable(now) && known.constraints;
     constraint->survey(now, found);
   }
-  solution.fault = !known.q              ? TorqueFault::position
-                   : !known.v            ? TorqueFault::velocity
-                   : !known.acceleration ? TorqueFault::acceleration
-                   : !known.mass         ? TorqueFault::mass_matrix
-                   : !known.bias         ? TorqueFault::bias
-                   : !known.constraints  ? TorqueFault::clearances
-                                         : TorqueFault::none;
+  solution.fault = !known.q              ? ProgramFault::position
+                   : !known.v            ? ProgramFault::velocity
+                   : !known.acceleration ? ProgramFault::acceleration
+                   : !known.mass         ? ProgramFault::mass_matrix
+                   : !known.bias         ? ProgramFault::bias
+                   : !known.constraints  ? ProgramFault::clearances
+                                         : ProgramFault::none;
   write(now, known, solution);
   if (known.all()) {
     solution.status = solve_constrained(now, known.acceleration && known.constraints, solution);
@@ -145,7 +145,7 @@ TorqueStatus MotionProgram::solve(const MotionRequest& request, TorqueSolution& 
     if (!dynamics_known) {
       solution.acceleration.setConstant(not_a_number);
     }
-    solution.status = TorqueStatus::fallback_invalid_input;
+    solution.status = ProgramStatus::fallback_invalid_input;
   }
   ++counts_[static_cast<std::size_t>(solution.status)];
   return solution.status;
@@ -199,7 +199,7 @@ double MotionProgram::jerk_share(const MotionPeriods& periods) const noexcept {
   return sidestep::jerk_share(mass_, limits_, rate_share);
 }
 
-void MotionProgram::write(const Moment& now, const Known& known, TorqueSolution& solution) noexcept {
+void MotionProgram::write(const Moment& now, const Known& known, MotionSolution& solution) noexcept {
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   solution.speed_frame = -1;
@@ -224,7 +224,7 @@ void MotionProgram::write(const Moment& now, const Known& known, TorqueSolution&
   }
 }
 
-TorqueStatus MotionProgram::solve_constrained(const Moment& now, bool usable, TorqueSolution& solution) noexcept {
+ProgramStatus MotionProgram::solve_constrained(const Moment& now, bool usable, MotionSolution& solution) noexcept {
   const bool smooth = now.last.acceleration != nullptr || now.last.torque != nullptr;
   if (!usable) {
     wanted_ = -velocity_ / settings_.stop_time;
@@ -232,12 +232,12 @@ TorqueStatus MotionProgram::solve_constrained(const Moment& now, bool usable, To
   hard_.write_torque(mass_, bounds_.torque);
   hard_.write_cost(cost());
   const Search found = search(now, solution);
-  TorqueStatus status;
+  ProgramStatus status;
   if (found.solved && !found.recovers && !presses_for_lost(blocks_)) {
     const bool free =
         std::all_of(solution.active.begin(), solution.active.end(), [](Limit limit) { return limit == Limit::none; }) &&
         std::all_of(blocks_.begin(), blocks_.end(), [](const RowBlock& block) { return block.multipliers.isZero(0.0); });
-    status = !found.kept_jerk ? TorqueStatus::relaxed : free ? TorqueStatus::ok : TorqueStatus::limited;
+    status = !found.kept_jerk ? ProgramStatus::relaxed : free ? ProgramStatus::ok : ProgramStatus::limited;
   } else {
     for (std::size_t k = 0; now.found.lost() && k < blocks_.size(); ++k) {
       constraints_[k]->defer_recovery(now, blocks_[k]);
@@ -245,29 +245,29 @@ TorqueStatus MotionProgram::solve_constrained(const Moment& now, bool usable, To
     // Recovery shares what the jerk limits leave; so do ways out while nothing of them closes, unless others need more.
     const bool waits = now.found.lost() && !now.found.closes && smooth;
     status = solve_relaxed(now, found.recovers || waits, solution);
-    if (waits && (status == TorqueStatus::fallback_solver || others_fall_short(blocks_, solution.acceleration))) {
+    if (waits && (status == ProgramStatus::fallback_solver || others_fall_short(blocks_, solution.acceleration))) {
       status = solve_relaxed(now, found.recovers, solution);
     }
     if (!(found.kept_jerk && (found.recovers || !smooth))) {
-      status = std::max(status, TorqueStatus::relaxed);
+      status = std::max(status, ProgramStatus::relaxed);
     }
   }
   solution.status = status;
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
     constraints_[k]->report(now, bounds_, blocks_[k], wanted_, solution);
     if (blocks_[k].unreachable) {
-      solution.status = std::max(solution.status, TorqueStatus::relaxed_safety);
+      solution.status = std::max(solution.status, ProgramStatus::relaxed_safety);
     }
   }
-  return usable || solution.status == TorqueStatus::fallback_solver ? solution.status : TorqueStatus::fallback_invalid_input;
+  return usable || solution.status == ProgramStatus::fallback_solver ? solution.status : ProgramStatus::fallback_invalid_input;
 }
 
 bool MotionProgram::solve_hard(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
-                               TorqueSolution& solution) noexcept {
+                               MotionSolution& solution) noexcept {
   return hard_.solve(lower, upper, smooth, bounds_, blocks_, solution) && accept(solution);
 }
 
-MotionProgram::Search MotionProgram::search(const Moment& now, TorqueSolution& solution) noexcept {
+MotionProgram::Search MotionProgram::search(const Moment& now, MotionSolution& solution) noexcept {
   const AccelerationBounds& box = bounds_.box;
   Search found{solve_hard(box.smooth_lower, box.smooth_upper, true, solution)};
   if (found.solved || (now.last.acceleration == nullptr && now.last.torque == nullptr)) {
@@ -294,7 +294,7 @@ MotionProgram::Search MotionProgram::search(const Moment& now, TorqueSolution& s
   return found;
 }
 
-bool MotionProgram::search_without_jerk(const Moment& now, TorqueSolution& solution) noexcept {
+bool MotionProgram::search_without_jerk(const Moment& now, MotionSolution& solution) noexcept {
   // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
   // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other.
   const AccelerationBounds& box = bounds_.box;
@@ -308,7 +308,7 @@ bool MotionProgram::search_without_jerk(const Moment& now, TorqueSolution& solut
          (now.last.torque != nullptr && !keeps_rate && solve_hard(box.lower, box.upper, false, solution));
 }
 
-bool MotionProgram::accept(TorqueSolution& solution) const noexcept {
+bool MotionProgram::accept(MotionSolution& solution) const noexcept {
   solution.torque = bias_;
   for (int j = 0; j < nv_; ++j) {
     solution.torque += solution.acceleration[j] * mass_.col(j);
@@ -321,7 +321,7 @@ bool MotionProgram::accept(TorqueSolution& solution) const noexcept {
   return solution.torque.allFinite();
 }
 
-void MotionProgram::stop(const Moment& now, bool mass_known, TorqueSolution& solution) const noexcept {
+void MotionProgram::stop(const Moment& now, bool mass_known, MotionSolution& solution) const noexcept {
   const BrakingTorque dynamics{mass_, mass_cholesky_, bias_};
   const DampedStop damped{settings_.stop_time, settings_.stop_damping};
   damped.apply({now.torque_period, limits_, velocity_, now.last.torque, dynamics, mass_known}, solution);

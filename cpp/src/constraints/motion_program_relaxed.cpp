@@ -7,11 +7,11 @@
 
 namespace sidestep {
 
-bool MotionProgram::solve_slack(bool rounded, TorqueSolution& solution) noexcept {
+bool MotionProgram::solve_slack(bool rounded, MotionSolution& solution) noexcept {
   return slack_.solve(hard_.data(), cost(), bounds_, short_rows_, rounded, blocks_, solution) && accept(solution);
 }
 
-TorqueStatus MotionProgram::solve_relaxed(const Moment& now, bool smooth, TorqueSolution& solution) noexcept {
+ProgramStatus MotionProgram::solve_relaxed(const Moment& now, bool smooth, MotionSolution& solution) noexcept {
   if (smooth) {
     bounds_.wide.lower = bounds_.box.smooth_lower;
     bounds_.wide.upper = bounds_.box.smooth_upper;
@@ -36,12 +36,12 @@ TorqueStatus MotionProgram::solve_relaxed(const Moment& now, bool smooth, Torque
                       (solve_slack(false, solution) || solve_slack(true, solution) || (find_shortfalls() && accept(solution))));
   if (!found) {
     stop(now, true, solution);
-    return TorqueStatus::fallback_solver;
+    return ProgramStatus::fallback_solver;
   }
   return judge_relaxed(box_reached, solution);
 }
 
-TorqueStatus MotionProgram::judge_relaxed(bool box_reached, TorqueSolution& solution) const noexcept {
+ProgramStatus MotionProgram::judge_relaxed(bool box_reached, MotionSolution& solution) const noexcept {
   const AccelerationBounds& box = bounds_.box;
   double farthest = 0.0;
   for (int i = 0; i < nv_; ++i) {
@@ -67,7 +67,7 @@ TorqueStatus MotionProgram::judge_relaxed(bool box_reached, TorqueSolution& solu
     const double short_by = row.block->missing(row.k, solution.acceleration);
     safe = safe && !(outside(short_by, row.block->required(row.k)) > 0.0);
   }
-  return !safe ? TorqueStatus::relaxed_safety : !bounds_kept ? TorqueStatus::relaxed : TorqueStatus::limited;
+  return !safe ? ProgramStatus::relaxed_safety : !bounds_kept ? ProgramStatus::relaxed : ProgramStatus::limited;
 }
 
 }  // namespace sidestep

@@ -4,33 +4,33 @@
 
 namespace sidestep {
 
-const char* name(TorqueStatus status) noexcept {
+const char* name(ProgramStatus status) noexcept {
   switch (status) {
-    case TorqueStatus::ok: return "ok";
-    case TorqueStatus::limited: return "limited";
-    case TorqueStatus::relaxed: return "relaxed";
-    case TorqueStatus::relaxed_safety: return "relaxed_safety";
-    case TorqueStatus::clearance_lost: return "clearance_lost";
-    case TorqueStatus::fallback_invalid_input: return "fallback_invalid_input";
-    case TorqueStatus::fallback_solver: return "fallback_solver";
+    case ProgramStatus::ok: return "ok";
+    case ProgramStatus::limited: return "limited";
+    case ProgramStatus::relaxed: return "relaxed";
+    case ProgramStatus::relaxed_safety: return "relaxed_safety";
+    case ProgramStatus::clearance_lost: return "clearance_lost";
+    case ProgramStatus::fallback_invalid_input: return "fallback_invalid_input";
+    case ProgramStatus::fallback_solver: return "fallback_solver";
   }
   return "unknown";
 }
 
-const char* name(TorqueFault fault) noexcept {
+const char* name(ProgramFault fault) noexcept {
   switch (fault) {
-    case TorqueFault::none: return "none";
-    case TorqueFault::position: return "position";
-    case TorqueFault::velocity: return "velocity";
-    case TorqueFault::acceleration: return "acceleration";
-    case TorqueFault::mass_matrix: return "mass_matrix";
-    case TorqueFault::bias: return "bias";
-    case TorqueFault::clearances: return "clearances";
+    case ProgramFault::none: return "none";
+    case ProgramFault::position: return "position";
+    case ProgramFault::velocity: return "velocity";
+    case ProgramFault::acceleration: return "acceleration";
+    case ProgramFault::mass_matrix: return "mass_matrix";
+    case ProgramFault::bias: return "bias";
+    case ProgramFault::clearances: return "clearances";
   }
   return "unknown";
 }
 
-TorqueSolution::TorqueSolution(int num_coordinates, int max_safety_rows)
+MotionSolution::MotionSolution(int num_coordinates, int max_safety_rows)
     : torque(Eigen::VectorXd::Zero(num_coordinates)),
       acceleration(Eigen::VectorXd::Zero(num_coordinates)),
       slack(Eigen::VectorXd::Zero(num_coordinates)),

@@ -54,7 +54,7 @@ void read_multipliers(const QuadraticProgram& program, Span at, RowBlock& block)
 }
 
 void add_active(const Bounds& bounds, bool smooth, int i, const JointMultipliers& multipliers,
-                TorqueSolution& solution) noexcept {
+                MotionSolution& solution) noexcept {
   const auto joint = static_cast<std::size_t>(i);
   const auto& upper = smooth ? bounds.box.smooth_upper_limit : bounds.box.upper_limit;
   const auto& lower = smooth ? bounds.box.smooth_lower_limit : bounds.box.lower_limit;

@@ -59,7 +59,7 @@ ShortfallProgram::ShortfallProgram(int num_coordinates, const std::vector<RowBlo
 }
 
 ShortfallProgram::Found ShortfallProgram::solve(const TrackingCost& cost, Bounds& bounds, std::vector<RowBlock>& blocks,
-                                                ShortRows& short_rows, TorqueSolution& solution) noexcept {
+                                                ShortRows& short_rows, MotionSolution& solution) noexcept {
   Program& program = *std::find_if(programs_.begin(), programs_.end() - 1,
                                    [&](const Program& one) { return one.short_rows.size >= short_rows.size(); });
   const double deepest = deepest_of(short_rows);
@@ -105,7 +105,7 @@ void ShortfallProgram::write(Program& program, const TrackingCost& cost, const B
 }
 
 bool ShortfallProgram::solve(Program& program, bool of_lost, const TrackingCost& cost, const Bounds& bounds,
-                             ShortRows& short_rows, TorqueSolution& solution) noexcept {
+                             ShortRows& short_rows, MotionSolution& solution) noexcept {
   QuadraticProgramData& data = program.data;
   data.lower.head(nv_) = bounds.wide.lower;
   data.upper.head(nv_) = bounds.wide.upper;
@@ -139,7 +139,7 @@ bool ShortfallProgram::solve(Program& program, bool of_lost, const TrackingCost&
 }
 
 bool ShortfallProgram::widen(const TrackingCost& cost, const std::vector<RowBlock>& blocks, Bounds& bounds,
-                             TorqueSolution& solution) noexcept {
+                             MotionSolution& solution) noexcept {
   QuadraticProgramData& data = widening_data_;
   data.H.diagonal().head(nv_).setConstant(regularisation);
   data.row_lower.segment(box_.begin, nv_) = bounds.wide.lower;

@@ -49,7 +49,7 @@ void SlackProgram::write(const QuadraticProgramData& hard, const TrackingCost& c
 
 bool SlackProgram::solve(const QuadraticProgramData& hard, const TrackingCost& cost, const Bounds& bounds,
                          const ShortRows& short_rows, bool rounded, std::vector<RowBlock>& blocks,
-                         TorqueSolution& solution) noexcept {
+                         MotionSolution& solution) noexcept {
   write(hard, cost, bounds);
   data_.row_lower.segment(short_.begin, short_.size).setConstant(-infinity);
   data_.row_upper.segment(short_.begin, short_.size).setConstant(infinity);
@@ -70,7 +70,7 @@ bool SlackProgram::solve(const QuadraticProgramData& hard, const TrackingCost& c
 }
 
 void SlackProgram::read(const Bounds& bounds, const ShortRows& short_rows, std::vector<RowBlock>& blocks,
-                        TorqueSolution& solution) noexcept {
+                        MotionSolution& solution) noexcept {
   solution.acceleration = program_.solution().head(acceleration_.size);
   const Eigen::VectorXd& multipliers = program_.multipliers();
   const int first = program_.num_variables();  // multipliers of the bounds come before those of the rows

@@ -115,7 +115,7 @@ void SpeedConstraint::append(const Moment& now, Bounds&, RowBlock& rows) noexcep
 }
 
 void SpeedConstraint::report(const Moment&, const Bounds&, const RowBlock& rows, const Eigen::VectorXd& wanted,
-                             TorqueSolution& solution) const noexcept {
+                             MotionSolution& solution) const noexcept {
   double largest = 0.0;
   for (int k = 0; k < rows.size; ++k) {
     const double slack = rows.shortfall(k, solution.acceleration, wanted.norm());
@@ -126,7 +126,7 @@ void SpeedConstraint::report(const Moment&, const Bounds&, const RowBlock& rows,
     }
   }
   if (solution.speed_slack > 0.0) {
-    solution.status = std::max(solution.status, TorqueStatus::relaxed);
+    solution.status = std::max(solution.status, ProgramStatus::relaxed);
   }
 }
 

@@ -21,7 +21,7 @@ void TorqueConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) noex
   std::fill(bounds.torque.upper_limit.begin(), bounds.torque.upper_limit.end(), Limit::torque_upper);
 }
 
-bool TorqueConstraint::admit(TorqueSolution& solution) const noexcept {
+bool TorqueConstraint::admit(MotionSolution& solution) const noexcept {
   for (Eigen::Index i = 0; i < solution.torque.size(); ++i) {
     const double effort = limits_.effort[i];
     if (!(std::abs(solution.torque[i]) <= effort * (1.0 + torque_tolerance))) {

@@ -13,6 +13,7 @@ ActivationDistances::ActivationDistances(std::shared_ptr<const GeometricSystem> 
     : system_(std::move(system)),
       clearances_(clearances),
       workspace_(*system_),
+      values_(system_->activations()),
       lowered_places_(Places(system_->robot().num_coordinates()).q) {}
 
 bool ActivationDistances::lower_at(const Places& places, const Obstacles& obstacles, GeometricSystem::Workspace& workspace,
@@ -27,22 +28,16 @@ bool ActivationDistances::lower_at(const Places& places, const Obstacles& obstac
   return inside;
 }
 
-void ActivationDistances::update(const Places& places, const Obstacles& obstacles, Eigen::VectorXd& activations,
-                                 bool& target_blocked) noexcept {
+void ActivationDistances::update(const Places& places, const Obstacles& obstacles, bool& target_blocked) noexcept {
   const std::uint64_t version = obstacles.version();
   if (places.num == num_lowered_ && version == lowered_version_ &&
       places.q.leftCols(places.num) == lowered_places_.leftCols(places.num)) {
     return;
   }
-  target_blocked = lower_at(places, obstacles, workspace_, activations);
+  target_blocked = lower_at(places, obstacles, workspace_, values_);
   lowered_places_ = places.q;
   num_lowered_ = places.num;
   lowered_version_ = version;
-}
-
-void ActivationDistances::reset(Eigen::VectorXd& activations) noexcept {
-  activations = system_->activations();
-  num_lowered_ = -1;
 }
 
 }  // namespace sidestep

@@ -35,18 +35,23 @@ class ActivationDistances {
   /// workspace of its own.
   bool lower_at(const Places& places, const Obstacles& obstacles, GeometricSystem::Workspace& workspace,
                 Eigen::VectorXd& activations) const noexcept;
-  /// The same in the thread of the step; nothing changes where places and obstacles are those of the last call. Writes whether the
-  /// target is blocked.
-  void update(const Places& places, const Obstacles& obstacles, Eigen::VectorXd& activations, bool& target_blocked) noexcept;
-  /// Writes the usual distances.
-  void reset(Eigen::VectorXd& activations) noexcept;
+  /// The same for `values`, in the thread of the step; nothing changes where places and obstacles are those of the last call. Writes
+  /// whether the target is blocked.
+  void update(const Places& places, const Obstacles& obstacles, bool& target_blocked) noexcept;
+  /// Takes other values: the usual ones, or what a worker found.
+  void take(const Eigen::VectorXd& values) noexcept {
+    values_ = values;
+    num_lowered_ = -1;
+  }
   /// The next `update` looks anew.
   void forget() noexcept { num_lowered_ = -1; }
+  const Eigen::VectorXd& values() const noexcept { return values_; }  // of each coordinate (m) [m | rad]
 
  private:
   std::shared_ptr<const GeometricSystem> system_;
   const std::vector<Eigen::Index>& clearances_;  // coordinates in metres
   GeometricSystem::Workspace workspace_;
+  Eigen::VectorXd values_;
   Eigen::MatrixXd lowered_places_;
   Eigen::Index num_lowered_ = -1;
   std::uint64_t lowered_version_ = 0;  // Version of the obstacles.

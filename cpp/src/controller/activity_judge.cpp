@@ -82,7 +82,7 @@ bool ActivityJudge::is_at_rest(const Eigen::VectorXd& v) const noexcept {
 
 void ActivityJudge::settle(const Evidence& now) noexcept {
   Memory& m = memory_;
-  const Way way = now.goal.way(m.rest_time, now.followed);
+  const Way way = now.goal.way(m.rest_time, now.followed, now.target_blocked);
   if (way != Way::unknown && way != m.way) {
     m.way = way;
     m.since = now.tick.time;

@@ -32,6 +32,7 @@ class ActivityJudge {
     bool stale = false, fresh = false;  // Obstacles are old; velocity or twist is fresh.
     bool under_way = false;             // A trajectory has not ended.
     bool waits = false;                 // A trajectory waits for its path to be free.
+    bool target_blocked = false;        // the target is inside a barrier
   };
   struct Verdict {
     Activity activity;

@@ -23,8 +23,10 @@ AttractorStage::AttractorStage(std::shared_ptr<const GeometricSystem> system, co
       clearances_(&reference_.clearances),
       arm_clearances_(&arm_.clearances) {}
 
-StepStatus AttractorStage::attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles,
-                                   const ClosingEstimate& closing, const Tick& tick, Eigen::VectorXd& wanted) noexcept {
+StepStatus AttractorStage::attract(const Lead& lead, const Eigen::VectorXd& activations, const Reference& reference,
+                                   const Obstacles& obstacles, const ClosingEstimate& closing, const Tick& tick,
+                                   Eigen::VectorXd& wanted) noexcept {
+  reference_.activations = activations;
   reference_.horizon = arm_.horizon = lead.avoidance != nullptr ? 0.0 : Horizon::of_obstacles;
   const StepStatus status = system_->acceleration(reference.q, reference.v, lead.goal, obstacles, reference_);
   clearances_ = &closing.corrected(reference_.clearances, corrected_);

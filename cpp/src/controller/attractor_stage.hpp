@@ -30,9 +30,10 @@ class AttractorStage {
  public:
   AttractorStage(std::shared_ptr<const GeometricSystem> system, const ControllerSettings& settings);
 
-  /// Writes the wanted acceleration of the reference among the obstacles.
-  StepStatus attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles, const ClosingEstimate& closing,
-                     const Tick& tick, Eigen::VectorXd& wanted) noexcept;
+  /// Writes the wanted acceleration of the reference among the obstacles; `activations`: see ActivationDistances.
+  StepStatus attract(const Lead& lead, const Eigen::VectorXd& activations, const Reference& reference,
+                     const Obstacles& obstacles, const ClosingEstimate& closing, const Tick& tick,
+                     Eigen::VectorXd& wanted) noexcept;
   /// Evaluates the clearances of the arm, which is not exactly where the reference is; false if they are unusable.
   bool look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
                    const ClosingEstimate& closing) noexcept;
@@ -46,7 +47,6 @@ class AttractorStage {
   const GeometricSystem& system() const noexcept { return *system_; }
   const GeometricSystem::Workspace& at_reference() const noexcept { return reference_; }
   const GeometricSystem::Workspace& at_arm() const noexcept { return arm_; }
-  Eigen::VectorXd& activations() noexcept { return reference_.activations; }
 
  private:
   /// Writes the acceleration that stops a velocity as fast as the limits of acceleration and jerk allow.

@@ -20,6 +20,7 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   state_ = before.state_;
   state_.followed = nullptr;
   state_.next_look = 0.0;
+  state_.findings.blocked = false;
   reference_ = before.reference_;
   last_ = before.last_;
   solution_ = before.solution_;

@@ -175,9 +175,7 @@ const ControllerSettings& Controller::settings() const noexcept { return setting
 const std::vector<CoordinateLabel>& Controller::labels() const noexcept { return impl_->model.system->labels(); }
 const GeometricSystem& Controller::system() const noexcept { return *impl_->model.system; }
 const GeometricSystem::Workspace& Controller::workspace() const noexcept { return impl_->workspace(); }
-StepStatus Controller::attraction_status() const noexcept { return impl_->attraction_status(); }
-TorqueStatus Controller::program_status() const noexcept { return impl_->program_status(); }
-const TorqueSolution& Controller::solution() const noexcept { return impl_->solution(); }
+detail::PartResults Controller::part_results() const noexcept { return impl_->part_results(); }
 Eigen::VectorXd Controller::target() const { return impl_->target(); }
 Plan Controller::last_plan() const {
   const std::lock_guard lock(setters_);

@@ -10,14 +10,14 @@
 namespace sidestep {
 namespace {
 
-std::string explain_stop(TorqueStatus program, const MeasuredState& arm, const Plausibility& plausible, TorqueFault fault) {
+std::string explain_stop(ProgramStatus program, const MeasuredState& arm, const Plausibility& plausible, ProgramFault fault) {
   if (arm.what_is_impossible().joint >= 0) {
     return "braking to a stop: " + plausible.describe(arm.what_is_impossible());
   }
-  if (program == TorqueStatus::fallback_solver) {
+  if (program == ProgramStatus::fallback_solver) {
     return "braking to a stop: the quadratic program was not solved";
   }
-  return std::string("braking to a stop: the ") + (fault == TorqueFault::none ? "state" : name(fault)) +
+  return std::string("braking to a stop: the ") + (fault == ProgramFault::none ? "state" : name(fault)) +
          " of this step is unusable; check its size and that it is finite";
 }
 
@@ -68,7 +68,7 @@ std::string Controller::Impl::explain_motion() const {
   if (!clock_.tick().goes_on()) {
     return "braking to a stop: " + clock_.explain() + "; it must go on from step to step";
   }
-  if (touch_.is_touched() && solution_.fault == TorqueFault::none) {
+  if (touch_.is_touched() && solution_.fault == ProgramFault::none) {
     return touch_.explain();
   }
   if (command_.status == SafetyStatus::stopping) {
@@ -120,7 +120,7 @@ std::string Controller::Impl::explain_way() const {
     return text + explain_start(model.arm.robot(), goal.planner()->last_plan().obstruction);
   }
   const std::string at_target = explain_target(model, board_, inputs_, sources_);
-  if (planner_status == OnlinePlannerStatus::goal_in_collision || goal.stops_short(state_.followed)) {
+  if (planner_status == OnlinePlannerStatus::goal_in_collision || goal.stops_short(state_.followed, state_.findings.blocked)) {
     return text + at_target;
   }
   if (!at_target.empty()) {

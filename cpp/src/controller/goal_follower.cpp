@@ -60,7 +60,7 @@ GoalFollower::GoalFollower(const ClearanceQuery& body, const ControllerSettings&
 }
 
 void GoalFollower::leave(bool goal) noexcept {
-  has_target = posture_found = target_blocked = rests = false;
+  has_target = posture_found = false;
   posture_attempt = 0;
   planner_status_ = OnlinePlannerStatus::idle;
   next_posture = 0.0;
@@ -69,7 +69,6 @@ void GoalFollower::leave(bool goal) noexcept {
 
 void GoalFollower::begin_anew(bool has_goal) noexcept {
   begins = has_goal;
-  target_blocked = rests = false;
   next_posture = 0.0;
 }
 
@@ -102,7 +101,7 @@ bool GoalFollower::begin(Goal& goal, bool moves, const Moment& now) noexcept {
 
 void GoalFollower::next(const PoseGoal& pose, const Moment& now) noexcept {
   planner_status_ = OnlinePlannerStatus::idle;
-  has_target = target_blocked = rests = false;
+  has_target = false;
   if (!settings_.synchronous) {
     asks_worker = true;
     return;
@@ -131,7 +130,7 @@ const Goal& GoalFollower::rest_at(const Eigen::VectorXd& q) noexcept {
   return led;
 }
 
-void GoalFollower::update_posture(const PoseGoal& pose, const Moment& now) noexcept {
+void GoalFollower::update_posture(const PoseGoal& pose, const Moment& now, TargetFindings& findings) noexcept {
   if (!settings_.synchronous && found_.update()) {
     const FoundPosture& found = found_.current();
     taken_.posture = &found;
@@ -141,18 +140,20 @@ void GoalFollower::update_posture(const PoseGoal& pose, const Moment& now) noexc
   }
   // A posture that no way leads to: another one.
   const bool fails = planner_status_ == OnlinePlannerStatus::no_path ||
-                     planner_status_ == OnlinePlannerStatus::goal_in_collision || (stops_short(&led) && (!planner_ || rests));
+                     planner_status_ == OnlinePlannerStatus::goal_in_collision ||
+                     (stops_short(&led, findings.blocked) && (!planner_ || findings.rests));
   if (has_target && fails && now.tick.time >= next_posture) {
     if (++posture_attempt % most_posture_attempts == 0) {
       next_posture = now.tick.time + posture_pause;
     }
+    findings = {};
     next(pose, now);
   }
 }
 
-const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avoids) noexcept {
+const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avoids, TargetFindings& findings) noexcept {
   if (pose != nullptr) {
-    update_posture(*pose, now);
+    update_posture(*pose, now, findings);
     if (!has_target) {
       return rest_at(now.reference.q);
     }
@@ -172,7 +173,7 @@ const Goal& GoalFollower::lead(const PoseGoal* pose, const Moment& now, bool avo
     }
   }
   const bool is_led = planner_ && planner_status_ != OnlinePlannerStatus::no_path;
-  if (local_minimum_ && !is_led && !target_blocked && !avoids) {
+  if (local_minimum_ && !is_led && !findings.blocked && !avoids) {
     return local_minimum_->pursue(led, now.arm_q, std::numeric_limits<double>::quiet_NaN(), now.tick.moved);
   }
   return led;
@@ -188,16 +189,16 @@ void GoalFollower::limit_speed(double speed_limit, double pace, const FrameSpeed
       std::min(pace, now > 0.0 && speed > of_limit * speed_limit * now ? of_limit * speed_limit * now / speed : 1.0));
 }
 
-bool GoalFollower::stops_short(const Goal* followed) const noexcept {
-  return target_blocked && (!planner_ || (path_.arrives && followed == &led));
+bool GoalFollower::stops_short(const Goal* followed, bool blocked) const noexcept {
+  return blocked && (!planner_ || (path_.arrives && followed == &led));
 }
 
-Way GoalFollower::way(double rest_time, const Goal* followed) const noexcept {
+Way GoalFollower::way(double rest_time, const Goal* followed, bool blocked) const noexcept {
   if (!has_target) {
     return Way::unknown;  // another posture is looked for
   }
   if (!posture_found || planner_status_ == OnlinePlannerStatus::no_path ||
-      planner_status_ == OnlinePlannerStatus::goal_in_collision || stops_short(followed)) {
+      planner_status_ == OnlinePlannerStatus::goal_in_collision || stops_short(followed, blocked)) {
     return Way::none;
   }
   if (!planner_) {
@@ -230,7 +231,6 @@ OnlinePlanner::Following GoalFollower::following(const Goal* followed) const noe
 
 void GoalFollower::go_on_from(const GoalFollower& before, bool has_goal_at_rest) noexcept {
   static_cast<GoalMemory&>(*this) = before;
-  target_blocked = false;
   next_posture = 0.0;
   if (planner_ && has_target) {
     planner_->set_goal(target);

@@ -27,17 +27,21 @@ struct FoundPosture {
 /// The way to a goal at rest, as the planner, the posture search and the barriers know it.
 enum class Way { unknown, open, none };
 
+/// What later stages found of the target.
+struct TargetFindings {
+  bool blocked = false;  // the target is inside a barrier
+  bool rests = false;    // the arm rests short of a goal that it was on the way to
+};
+
 /// What following a goal remembers from one step to the next, whatever body the arm has.
 struct GoalMemory {
   explicit GoalMemory(Eigen::Index nv);
 
   Eigen::VectorXd target;  // the configuration that the arm is led to
   bool has_target = false;
-  bool posture_found = false;   // the target is a posture with the pose, or a joint goal
-  bool target_blocked = false;  // the target is inside a barrier
-  bool rests = false;           // the arm rests short of a goal that it was on the way to
-  bool begins = false;          // a goal was set and has not begun
-  bool asks_worker = false;     // A posture is asked of the worker.
+  bool posture_found = false;  // the target is a posture with the pose, or a joint goal
+  bool begins = false;         // a goal was set and has not begun
+  bool asks_worker = false;    // A posture is asked of the worker.
   std::uint64_t posture_attempt = 0;
   double next_posture = 0.0;  // time from which another posture is tried [s]
   Goal led;                   // JointGoal: what the reference is led by
@@ -68,8 +72,9 @@ class GoalFollower : private GoalMemory {
   void begin_anew(bool has_goal) noexcept;
   /// The goal begins, once the state is known. True if a new way must be found.
   bool begin(Goal& goal, bool moves, const Moment& now) noexcept;
-  /// The goal that leads the reference now. `pose`: the goal that was set, if it is a pose; `avoids`: the look-ahead leads the arm.
-  const Goal& lead(const PoseGoal* pose, const Moment& now, bool avoids) noexcept;
+  /// The goal that leads the reference now. `pose`: the goal that was set, if it is a pose; `avoids`: the look-ahead leads the arm;
+  /// `findings`: as the last step left them, cleared where another posture is tried.
+  const Goal& lead(const PoseGoal* pose, const Moment& now, bool avoids, TargetFindings& findings) noexcept;
   /// The reference stays where it is.
   const Goal& rest_at(const Eigen::VectorXd& q) noexcept;
   /// Slows the path so that no frame is faster than `speed_limit` [m/s], and no faster than `pace` in [0, 1].
@@ -79,8 +84,6 @@ class GoalFollower : private GoalMemory {
       planner_->limit_pace(pace);
     }
   }
-  void set_target_blocked(bool is) noexcept { target_blocked = is; }
-  void set_rests(bool is) noexcept { rests = is; }
   /// The end of an input is a goal, which begins.
   void begin_next() noexcept { begins = true; }
   /// Another arm takes over: the target stays, and a new way to it is searched. `has_goal_at_rest`: a goal is set and does not move.
@@ -89,10 +92,11 @@ class GoalFollower : private GoalMemory {
   bool asks() const noexcept { return asks_worker; }
   bool take_question() noexcept { return std::exchange(asks_worker, false); }
 
-  /// The way to the goal for an arm that has rested short of it for `rest_time` [s]. `followed`: the goal that leads the reference.
-  Way way(double rest_time, const Goal* followed) const noexcept;
+  /// The way to the goal for an arm that has rested short of it for `rest_time` [s]. `followed`: the goal that leads the reference;
+  /// `blocked`: the target is inside a barrier.
+  Way way(double rest_time, const Goal* followed, bool blocked) const noexcept;
   /// Whether the arm stops before its target: it goes straight there, and the target is inside something.
-  bool stops_short(const Goal* followed) const noexcept;
+  bool stops_short(const Goal* followed, bool blocked) const noexcept;
   /// Writes the configurations near which activation distances shrink.
   void write_places(Places& places) const noexcept;
   /// Where `followed` is on the planner's path; number 0 if it does not follow one.
@@ -111,7 +115,6 @@ class GoalFollower : private GoalMemory {
   const Eigen::VectorXd& target_position() const noexcept { return target; }
   bool is_led_to_target() const noexcept { return has_target; }
   bool reaches_goal() const noexcept { return posture_found; }  // the target is what was asked for
-  bool target_is_blocked() const noexcept { return target_blocked; }
   std::uint64_t attempt() const noexcept { return posture_attempt; }
   PostureFinder& posture_finder() noexcept { return postures_; }
   TripleBuffer<FoundPosture>& found_postures() noexcept { return found_; }
@@ -127,7 +130,7 @@ class GoalFollower : private GoalMemory {
   void next(const PoseGoal& pose, const Moment& now) noexcept;
   void take(const Posture& posture) noexcept;
   /// Takes what the worker found, and goes on to another posture where no way leads to this one.
-  void update_posture(const PoseGoal& pose, const Moment& now) noexcept;
+  void update_posture(const PoseGoal& pose, const Moment& now, TargetFindings& findings) noexcept;
 
   const ClearanceQuery& body_;
   const ControllerSettings& settings_;

@@ -70,9 +70,7 @@ class Controller::Impl {
   const Tick& tick() const noexcept { return clock_.tick(); }
   const MeasuredState& measured() const noexcept { return measured_; }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
-  StepStatus attraction_status() const noexcept { return state_.attraction; }
-  TorqueStatus program_status() const noexcept { return state_.program; }
-  const TorqueSolution& solution() const noexcept { return solution_; }
+  detail::PartResults part_results() const noexcept { return {state_.attraction, state_.program, solution_}; }
 
   // Before the first step.
   /// Takes over the requests of another one whose arm has the same joints.
@@ -105,12 +103,13 @@ class Controller::Impl {
     explicit StepState(Eigen::Index nv);
 
     std::uint64_t steps = 0;
-    double next_look = 0.0;                                       // [s]
-    bool apart = false;                                           // the arm is not exactly where the reference is
-    const Goal* followed = nullptr;                               // Goal by which the reference is led.
-    StepStatus attraction = StepStatus::invalid_state;            // how the attractor ended
-    TorqueStatus program = TorqueStatus::fallback_invalid_input;  // how the program ended
+    double next_look = 0.0;                                         // [s]
+    bool apart = false;                                             // the arm is not exactly where the reference is
+    const Goal* followed = nullptr;                                 // Goal by which the reference is led.
+    StepStatus attraction = StepStatus::invalid_state;              // how the attractor ended
+    ProgramStatus program = ProgramStatus::fallback_invalid_input;  // how the program ended
     Eigen::VectorXd wanted, coupling;  // accelerations: after barriers, and to an arm that cannot follow
+    TargetFindings findings;           // Findings for the next step.
     Places places;                     // Configurations near which activation distances shrink.
   };
 
@@ -133,12 +132,12 @@ class Controller::Impl {
   /// Share of its speed that the arm may use: for the look-ahead's age, and where torques change rarely.
   double pace(const Tick& tick) const noexcept;
   /// The program's answer to the wanted acceleration, with the clearances of the arm where that is `apart`.
-  TorqueStatus solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
-                     const Tick& tick) noexcept;
+  ProgramStatus solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
+                      const Tick& tick) noexcept;
   /// Lets the reference go on only to where it can stop, see BackupManoeuvre.
-  TorqueStatus guard(TorqueStatus solved, const Tick& tick) noexcept;
-  TorqueStatus track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
-                     const Tick& tick) noexcept;
+  ProgramStatus guard(ProgramStatus solved, const Tick& tick) noexcept;
+  ProgramStatus track(ProgramStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
+                      const Tick& tick) noexcept;
   void tell_worker(const Goal& followed, double time, bool wakes) noexcept;
   /// A stop, where the state or its time is unusable.
   const Command& stop(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, const Tick& tick) noexcept;
@@ -179,7 +178,7 @@ class Controller::Impl {
   TouchJudge touch_;
   SpeedLimiter speed_;
   JointProgram program_;
-  TorqueSolution solution_;  // Solution for the reference.
+  MotionSolution solution_;  // Solution for the reference.
   BackupManoeuvre guard_;
   Tracker tracker_;
   ActivityJudge activity_;

@@ -26,7 +26,7 @@ InputsStage::Target InputsStage::target(const Moment& now) noexcept {
   const Eigen::VectorXd& q = now.reference.q;
   if (!now.agrees) {  // what was told begins once the arm is known to be there
     input_.clear();
-    return {&goal_.rest_at(q)};
+    return {&goal_.rest_at(q), false, now.findings};
   }
   if (request_.begins_input()) {
     begin_input(now);
@@ -37,13 +37,15 @@ InputsStage::Target InputsStage::target(const Moment& now) noexcept {
   }
   const GoalFollower::Moment moment{now.reference, now.arm_q, now.obstacles, now.tick, request_.number()};
   const bool is_another_way = goal_.begins_goal() && goal_.begin(own_destination(), request_.moves(), moment);
+  TargetFindings findings = is_another_way ? TargetFindings{} : now.findings;
   if (!request_.is_any() || now.stale) {
-    return {&goal_.rest_at(q), is_another_way};
+    return {&goal_.rest_at(q), is_another_way, findings};
   }
   if (request_.moves()) {
-    return {&destination(), is_another_way};
+    return {&destination(), is_another_way, findings};
   }
-  return {&goal_.lead(request_.pose_goal(), moment, now.avoids), is_another_way};
+  const Goal& led = goal_.lead(request_.pose_goal(), moment, now.avoids, findings);
+  return {&led, is_another_way, findings};
 }
 
 void InputsStage::begin_input(const Moment& now) noexcept {

@@ -26,13 +26,15 @@ class InputsStage {
     const NearReference& near;  // as the last step left it
     const Tick& tick;
     double pace = 1.0;
-    bool agrees = true;   // the arm is where the reference is; else nothing begins
-    bool stale = false;   // the obstacles are old: the arm stops
-    bool avoids = false;  // the arm is led out of the way
+    bool agrees = true;            // the arm is where the reference is; else nothing begins
+    bool stale = false;            // the obstacles are old: the arm stops
+    bool avoids = false;           // the arm is led out of the way
+    TargetFindings findings = {};  // as the last step left them
   };
   struct Target {
     const Goal* followed = nullptr;  // valid until the next step
     bool is_another_way = false;     // than that in the step before has to be found
+    TargetFindings findings = {};    // those that still hold
   };
 
   /// Takes over the newest request: true where it is another one.

@@ -37,9 +37,9 @@ Robot within_margins(const Robot& robot, const ControllerSettings& settings, dou
 JointProgram::JointProgram(const Robot& robot, const ControllerSettings& settings, bool torque)
     : program_(robot, program_settings(settings, torque)) {}
 
-TorqueStatus JointProgram::stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
-                                const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
-                                TorqueSolution& solution) noexcept {
+ProgramStatus JointProgram::stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
+                                 const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
+                                 MotionSolution& solution) noexcept {
   const LastCommand last{nullptr, program_.settings().by_torque ? last_torque : nullptr};
   const bool usable = told.mass_matrix != nullptr && told.bias->size() == dynamics.bias().size() && told.bias->allFinite();
   const MotionPeriods periods = periods_of(tick);

@@ -19,17 +19,17 @@ class JointProgram {
   JointProgram(const Robot& within_margins, const ControllerSettings& settings, bool torque);
 
   /// The acceleration nearest to the wanted one at q, v, with the dynamics there.
-  [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted,
-                                   const ArmDynamics& dynamics, const Clearances* clearances, const SecondState& second,
-                                   const LastCommand& last, const Tick& tick, TorqueSolution& solution,
-                                   const SpeedLimitNow& speed = {}) noexcept {
+  [[nodiscard]] ProgramStatus solve(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted,
+                                    const ArmDynamics& dynamics, const Clearances* clearances, const SecondState& second,
+                                    const LastCommand& last, const Tick& tick, MotionSolution& solution,
+                                    const SpeedLimitNow& speed = {}) noexcept {
     return program_.solve({q, v, wanted, dynamics.mass(), dynamics.bias(), clearances, second, last, speed, periods_of(tick)},
                           solution);
   }
   /// A damped stop of an arm whose state may be unusable, with the dynamics told where they are.
-  [[nodiscard]] TorqueStatus stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
-                                  const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
-                                  TorqueSolution& solution) noexcept;
+  [[nodiscard]] ProgramStatus stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
+                                   const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque, const Tick& tick,
+                                   MotionSolution& solution) noexcept;
   /// Share of the jerk limits with which torques keep their rate.
   double jerk_share(const Tick& tick) const noexcept {
     return program_.settings().by_torque ? program_.jerk_share(periods_of(tick)) : 1.0;

@@ -18,15 +18,15 @@ double within_limits(double q, double lower, double upper, bool slides) noexcept
   return std::abs(q - within) < (slides ? prismatic_noise : position_noise) ? within : q;
 }
 
-SafetyStatus safety_of(TorqueStatus program) noexcept {
+SafetyStatus safety_of(ProgramStatus program) noexcept {
   switch (program) {
-    case TorqueStatus::ok: return SafetyStatus::ok;
-    case TorqueStatus::limited: return SafetyStatus::limited;
-    case TorqueStatus::relaxed: return SafetyStatus::relaxed;
-    case TorqueStatus::relaxed_safety: return SafetyStatus::margin_lost;
-    case TorqueStatus::clearance_lost: return SafetyStatus::clearance_lost;
-    case TorqueStatus::fallback_invalid_input:
-    case TorqueStatus::fallback_solver: break;
+    case ProgramStatus::ok: return SafetyStatus::ok;
+    case ProgramStatus::limited: return SafetyStatus::limited;
+    case ProgramStatus::relaxed: return SafetyStatus::relaxed;
+    case ProgramStatus::relaxed_safety: return SafetyStatus::margin_lost;
+    case ProgramStatus::clearance_lost: return SafetyStatus::clearance_lost;
+    case ProgramStatus::fallback_invalid_input:
+    case ProgramStatus::fallback_solver: break;
   }
   return SafetyStatus::stopping;
 }
@@ -160,13 +160,11 @@ void Controller::Impl::report_status(const Goal& followed, bool apart, const Tic
   if (reduced && status == SafetyStatus::ok) {
     status = SafetyStatus::limited;
   }
-  const ActivityJudge::Verdict verdict = activity_.judge({inputs_.request(), inputs_.destination(), inputs_.goal(), &followed,
-                                                          measured_, arm_state(apart), state_.attraction, tick, must_rest(),
-                                                          inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits()});
+  const ActivityJudge::Verdict verdict = activity_.judge(
+      {inputs_.request(), inputs_.destination(), inputs_.goal(), &followed, measured_, arm_state(apart), state_.attraction,
+       tick, must_rest(), inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits(), state_.findings.blocked});
   command_.activity = touch_.is_touched() && !stale ? Activity::waiting : verdict.activity;
-  if (verdict.rests) {
-    inputs_.goal().set_rests(*verdict.rests);
-  }
+  state_.findings.rests = verdict.rests.value_or(state_.findings.rests);
   if (look_ahead_.slows(command_.activity == Activity::moving)) {
     status = std::max(status, SafetyStatus::limited);
   }

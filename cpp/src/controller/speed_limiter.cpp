@@ -40,7 +40,7 @@ std::optional<double> SpeedLimiter::update(const KinematicState& reference, cons
   return limits.allowed(now - closing / tick.moved * foresight);
 }
 
-std::string SpeedLimiter::explain(const Command& command, const TorqueSolution& solution, const Obstacles& obstacles) const {
+std::string SpeedLimiter::explain(const Command& command, const MotionSolution& solution, const Obstacles& obstacles) const {
   if (!settings_.speed_limits || solution.speed_frame < 0) {
     return "";
   }

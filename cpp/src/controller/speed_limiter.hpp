@@ -27,7 +27,7 @@ class SpeedLimiter {
   const SpeedLimitNow& at_arm() const noexcept { return at_arm_; }
   const FrameSpeeds& frames() const noexcept { return frames_; }
   /// Which frame is slowed, and by what; empty where none is.
-  std::string explain(const Command& command, const TorqueSolution& solution, const Obstacles& obstacles) const;
+  std::string explain(const Command& command, const MotionSolution& solution, const Obstacles& obstacles) const;
 
  private:
   const ClearanceQuery& body_;

@@ -33,6 +33,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const NearReference near = near_reference();
   const InputsStage::Target target = inputs_.target(moment(near, tick));
   const Goal& followed = *(state_.followed = target.followed);
+  state_.findings = target.findings;
   taken_.goal = inputs_.goal().taken();
   if (target.is_another_way) {
     activity_.forget(time);
@@ -41,14 +42,14 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   look_ahead(followed, tick, obstacles);
 
   // Desired = attractor(Target, World)
-  state_.attraction =
-      attractor_.attract(lead(followed, must_rest(), tick), reference_, obstacles, sources_.closing(), tick, state_.wanted);
+  state_.attraction = attractor_.attract(lead(followed, must_rest(), tick), distances_.values(), reference_, obstacles,
+                                         sources_.closing(), tick, state_.wanted);
   state_.wanted += state_.coupling;
 
   // Program = constraints, solved; Manoeuvre = guard.admit(...)
   state_.program = guard(solve(state_.wanted, apart, followed, told, tick), tick);
   reference_.advance(solution_.acceleration,
-                     state_.program == TorqueStatus::relaxed_safety || state_.program == TorqueStatus::clearance_lost,
+                     state_.program == ProgramStatus::relaxed_safety || state_.program == ProgramStatus::clearance_lost,
                      model.arm.robot().limits().jerk, tick.period);
 
   // Command = tracker(...)
@@ -85,6 +86,7 @@ void Controller::Impl::take_over(const Tick& tick) noexcept {
   }
   if (inputs_.update(tick)) {
     distances_.forget();
+    state_.findings = {};
     if (inputs_.request().goal() == nullptr) {
       activity_.forget(tick.time);
     }
@@ -143,6 +145,7 @@ void Controller::Impl::begin_motion() noexcept {
     inputs_.begin_anew();
     look_ahead_.begin_anew();
     distances_.forget();
+    state_.findings = {};
     tracker_.begin_anew();
     state_.next_look = 0.0;
   }
@@ -150,12 +153,12 @@ void Controller::Impl::begin_motion() noexcept {
 
 InputsStage::Moment Controller::Impl::moment(const NearReference& near, const Tick& tick) const noexcept {
   return {
-      reference_,  measured_.position(),     sources_.obstacles(), near, tick, pace(tick), measured_.agrees_with_reference(),
-      must_rest(), look_ahead_.is_followed()};
+      reference_,  measured_.position(),      sources_.obstacles(), near, tick, pace(tick), measured_.agrees_with_reference(),
+      must_rest(), look_ahead_.is_followed(), state_.findings};
 }
 
 void Controller::Impl::update_activation_distances(bool looks, const Obstacles& obstacles) noexcept {
-  GoalFollower& goal = inputs_.goal();
+  const GoalFollower& goal = inputs_.goal();
   if (looks) {
     sources_.look_for_movers(reference_.q);
     if (obstacles.tree().moves()) {
@@ -167,22 +170,20 @@ void Controller::Impl::update_activation_distances(bool looks, const Obstacles& 
   }
   if (sources_.has_movers() || !goal.is_led_to_target()) {
     if (looks) {
-      distances_.reset(attractor_.activations());
+      distances_.take(model.system->activations());
     }
   } else if (model.settings.synchronous) {
     if (looks) {
       goal.write_places(state_.places);
-      bool blocked = goal.target_is_blocked();
-      distances_.update(state_.places, obstacles, attractor_.activations(), blocked);
-      goal.set_target_blocked(blocked);
+      distances_.update(state_.places, obstacles, state_.findings.blocked);
     }
   } else {
     taken_.activations = worker_.activations().update() ? &worker_.activations().current() : nullptr;
     if (taken_.activations != nullptr || looks) {
       const FoundActivations& found = worker_.activations().current();
       const bool ours = found.request_number == inputs_.request().number() && found.posture_attempt == goal.attempt();
-      attractor_.activations() = ours ? found.values : model.system->activations();
-      goal.set_target_blocked(ours && found.target_blocked);
+      distances_.take(ours ? found.values : model.system->activations());
+      state_.findings.blocked = ours && found.target_blocked;
     }
   }
 }
@@ -236,8 +237,8 @@ Lead Controller::Impl::lead(const Goal& followed, bool stale, const Tick& tick) 
           slows_itself ? 1.0 : pace(tick), stale || !measured_.agrees_with_reference()};
 }
 
-TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
-                                     const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, const Goal& followed, const ToldDynamics& told,
+                                      const Tick& tick) noexcept {
   SecondState second;
   if (apart && attractor_.look_at_arm(measured_.position(), measured_.velocity(), sources_.obstacles(), sources_.closing())) {
     second = {&attractor_.arm_clearances(), &measured_.velocity()};
@@ -258,15 +259,15 @@ TorqueStatus Controller::Impl::solve(const Eigen::VectorXd& wanted, bool apart, 
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     dynamics_.update(at_reference, !apart || !dynamics_.has_model() ? told : ToldDynamics{});
   }
-  const TorqueStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
-                                             last, tick, solution_, speed_.at_reference());
+  const ProgramStatus status = program_.solve(reference_.q, reference_.v, wanted, dynamics_, &attractor_.clearances(), second,
+                                              last, tick, solution_, speed_.at_reference());
   if (model.torque) {
     reference_.torque = solution_.torque;
   }
   return status;
 }
 
-TorqueStatus Controller::Impl::guard(TorqueStatus solved, const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::guard(ProgramStatus solved, const Tick& tick) noexcept {
   // Beside what moves a stop would only wait for it; and the way out of what is lost comes before the jerk.
   if (sources_.has_movers() || look_ahead_.is_followed() || solution_.least_clearance < 0.0 ||
       !solution_.acceleration.allFinite()) {
@@ -284,11 +285,11 @@ TorqueStatus Controller::Impl::guard(TorqueStatus solved, const Tick& tick) noex
     torque.of(solution_.acceleration, solution_.torque);
     reference_.torque = solution_.torque;
   }
-  return TorqueStatus::limited;
+  return ProgramStatus::limited;
 }
 
-TorqueStatus Controller::Impl::track(TorqueStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
-                                     const Tick& tick) noexcept {
+ProgramStatus Controller::Impl::track(ProgramStatus solved, bool apart, double tracking_error, const ToldDynamics& told,
+                                      const Tick& tick) noexcept {
   if (!apart || tracker_.drives_track()) {
     tracker_.follow(solution_);
     return solved;
@@ -311,8 +312,8 @@ const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const 
     static_cast<void>(program_.solve(reference_.q, reference_.v, state_.wanted, dynamics_, nullptr, {},
                                      LastCommand{&reference_.smooth_a}, tick, tracker_.solution()));
     solution_.acceleration = tracker_.solution().acceleration;
-    solution_.fault = q_known ? TorqueFault::velocity : TorqueFault::position;
-    state_.program = TorqueStatus::fallback_invalid_input;
+    solution_.fault = q_known ? ProgramFault::velocity : ProgramFault::position;
+    state_.program = ProgramStatus::fallback_invalid_input;
     guard_.reset();
     reference_.advance(solution_.acceleration, false, model.arm.robot().limits().jerk, tick.period);
   } else {
@@ -324,7 +325,7 @@ const Command& Controller::Impl::stop(ConstVectorRef q, ConstVectorRef v, const 
     }
     state_.program = program_.stop(is_impossible ? ConstVectorRef(none) : q, is_impossible ? ConstVectorRef(none) : v,
                                    state_.wanted, told, dynamics_, last_.has_torque ? &last_.torque : nullptr, tick, solution_);
-    state_.program = std::max(state_.program, TorqueStatus::fallback_invalid_input);
+    state_.program = std::max(state_.program, ProgramStatus::fallback_invalid_input);
     tracker_.follow(solution_);
   }
   report_stop(tick);

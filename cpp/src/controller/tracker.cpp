@@ -103,8 +103,8 @@ double Tracker::feedback_frequency(const Reference& reference, const Arm& arm, c
   return w;
 }
 
-TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double tracking_error, TorqueStatus decided,
-                            const Tick& tick) noexcept {
+ProgramStatus Tracker::track(const Reference& reference, const Arm& arm, double tracking_error, ProgramStatus decided,
+                             const Tick& tick) noexcept {
   if (is_impedance()) {
     write_impedance(reference, arm, tick);
   } else {
@@ -115,7 +115,7 @@ TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double t
   // The reference's acceleration meets the clearances of the arm too, as far as possible. They are asked again where feedback wants
   // something else, for no more than that acceleration gives them; and where one is lost, which the torque's rate gives way to.
   const bool as_reference =
-      decided != TorqueStatus::clearance_lost &&
+      decided != ProgramStatus::clearance_lost &&
       ((feedback_ - reference.a).cwiseAbs().array() < like_reference * limits_.acceleration.array()).all();
   const Clearances* const clearances = as_reference ? nullptr : &arm.clearances;
   LastCommand last{&arm.last.acceleration};
@@ -124,9 +124,9 @@ TorqueStatus Tracker::track(const Reference& reference, const Arm& arm, double t
     last = near_last(arm.last.acceleration, arm.last.has_torque ? &arm.last.torque : nullptr, arm.dynamics, factor, false);
   }
   last.decided = &reference.a;
-  const TorqueStatus status =
+  const ProgramStatus status =
       program_.solve(arm.q, arm.v, feedback_, arm.dynamics, clearances, {}, last, tick, solution_, arm.speed);
-  return status > TorqueStatus::limited ? std::max(decided, status) : decided;
+  return status > ProgramStatus::limited ? std::max(decided, status) : decided;
 }
 
 void Tracker::write_impedance(const Reference& reference, const Arm& arm, const Tick& tick) noexcept {

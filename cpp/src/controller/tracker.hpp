@@ -47,10 +47,10 @@ class Tracker {
   };
   /// Writes the solution that tracks the reference; `tracking_error` [rad | m]: the largest of a joint. `decided`: what the program
   /// of the reference ended with. Returns that, or what is worse.
-  TorqueStatus track(const Reference& reference, const Arm& arm, double tracking_error, TorqueStatus decided,
-                     const Tick& tick) noexcept;
+  ProgramStatus track(const Reference& reference, const Arm& arm, double tracking_error, ProgramStatus decided,
+                      const Tick& tick) noexcept;
   /// The arm is where the reference is: it is commanded the same.
-  void follow(const TorqueSolution& reference) noexcept {
+  void follow(const MotionSolution& reference) noexcept {
     solution_.torque = reference.torque;
     solution_.acceleration = reference.acceleration;
   }
@@ -64,8 +64,8 @@ class Tracker {
   void go_on_from(const Tracker& before) noexcept;
 
   bool drives_track() const noexcept { return drives_track_; }  ///< position or velocity is commanded
-  const TorqueSolution& solution() const noexcept { return solution_; }
-  TorqueSolution& solution() noexcept { return solution_; }
+  const MotionSolution& solution() const noexcept { return solution_; }
+  MotionSolution& solution() noexcept { return solution_; }
 
  private:
   static constexpr int most_of_impedance = 32;  // joints
@@ -84,7 +84,7 @@ class Tracker {
   const ControllerSettings& settings_;
   const bool torque_, drives_track_;
   JointProgram program_;
-  TorqueSolution solution_;
+  MotionSolution solution_;
   Eigen::VectorXd feedback_;
   Eigen::VectorXd drift_;  // Commanded velocity less that of the reference, with velocity output [rad/s | m/s].
   Eigen::MatrixXd mass_cholesky_;

@@ -70,7 +70,7 @@ FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::Ve
   JointLimits limits = test::arm_limits(nv);
   limits.jerk.setConstant(1000.0);
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   const double T = filter.settings().period;
   const auto num = static_cast<int>(begin.size());
   const Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
@@ -104,7 +104,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram controller(test::serial_arm(limits));
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv), filtered(nv);
+  MotionSolution solution(nv), filtered(nv);
   const double T = controller.settings().period, rounding = 1.0 + 1e-6;
   const double fastest = controller.settings().velocity_overrun * 2.5 * rounding;
   for (int trial = 0; trial < 3000; ++trial) {
@@ -124,10 +124,10 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
         }),
         0u);
     const double least = least_of(clearances);
-    for (const TorqueSolution* s : {&solution, &filtered}) {
-      BOOST_REQUIRE(s->status <= TorqueStatus::clearance_lost);
+    for (const MotionSolution* s : {&solution, &filtered}) {
+      BOOST_REQUIRE(s->status <= ProgramStatus::clearance_lost);
       BOOST_REQUIRE_EQUAL(s->least_clearance, least);
-      BOOST_REQUIRE_EQUAL(s->status == TorqueStatus::clearance_lost, least < 0.0);
+      BOOST_REQUIRE_EQUAL(s->status == ProgramStatus::clearance_lost, least < 0.0);
     }
     BOOST_REQUIRE((solution.torque.array().abs() <= limits.effort.array()).all());
     BOOST_REQUIRE_LE((v + T * solution.acceleration).cwiseAbs().maxCoeff(), fastest);
@@ -135,7 +135,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
     BOOST_REQUIRE_LE((v + T * filtered.acceleration).cwiseAbs().maxCoeff(), 2.5 * rounding);
     BOOST_REQUIRE_LE(filtered.acceleration.cwiseAbs().maxCoeff(), 10.0 * rounding);
   }
-  BOOST_TEST(controller.count(TorqueStatus::clearance_lost) > 1000);
+  BOOST_TEST(controller.count(ProgramStatus::clearance_lost) > 1000);
 }
 
 BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
@@ -143,7 +143,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
   Random random(12);
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram controller(test::serial_arm(limits));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 3000; ++trial) {
     const Clearances clearances = hopeless(random);
     Eigen::VectorXd q(nv), v(nv), h(nv);
@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(there_is_a_command_also_beyond_every_limit) {
     }
     const Eigen::MatrixXd M = test::random_mass(random, nv);
     static_cast<void>(controller.solve({q, v, random.vector(nv), M, h, &clearances}, solution));
-    BOOST_REQUIRE(solution.status <= TorqueStatus::clearance_lost);
+    BOOST_REQUIRE(solution.status <= ProgramStatus::clearance_lost);
     BOOST_REQUIRE((solution.torque.array().abs() <= limits.effort.array()).all());
     BOOST_REQUIRE(solution.acceleration.allFinite());
   }
@@ -167,7 +167,7 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   for (const bool torque : {false, true}) {
-    TorqueSolution solution(nv);
+    MotionSolution solution(nv);
     Eigen::VectorXd q = zero, v = zero;
     q[0] = 0.02;
     v[0] = 0.5;
@@ -175,10 +175,10 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the
     for (int step = 0; step < 4000; ++step) {
       const Clearances clearances = pressed(q[0], v[0], 0.1);
       const Eigen::VectorXd wanted = Eigen::VectorXd::Constant(nv, 1.0) - 20.0 * v;
-      const TorqueStatus status =
+      const ProgramStatus status =
           torque ? controller.solve({q, v, wanted, M, zero, &clearances}, solution)
                  : filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances}, solution);
-      BOOST_REQUIRE(status == TorqueStatus::clearance_lost);
+      BOOST_REQUIRE(status == ProgramStatus::clearance_lost);
       v += 0.001 * solution.acceleration;
       q += 0.001 * v;
       if (step >= 3000) {
@@ -195,14 +195,14 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_pressed_from_both_sides_comes_to_rest_in_the
 BOOST_AUTO_TEST_CASE(a_clearance_that_no_joint_changes_is_told) {
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
   MotionProgram filter(test::serial_arm(test::arm_limits(nv)), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
   Clearances clearances(nv, 1);
   clearances.nearest[0] = 7;
   for (const auto& [clearance, rate, status] :
-       {std::tuple(-1.0, 0.0, TorqueStatus::clearance_lost), std::tuple(0.002, 0.0, TorqueStatus::relaxed_safety),
-        std::tuple(0.050, -1.0, TorqueStatus::relaxed_safety), std::tuple(0.050, 0.0, TorqueStatus::ok)}) {
+       {std::tuple(-1.0, 0.0, ProgramStatus::clearance_lost), std::tuple(0.002, 0.0, ProgramStatus::relaxed_safety),
+        std::tuple(0.050, -1.0, ProgramStatus::relaxed_safety), std::tuple(0.050, 0.0, ProgramStatus::ok)}) {
     clearances.values[0] = clearances.least[0] = clearance;
     clearances.rates[0] = rate;
     clearances.mind_nearest();
@@ -214,14 +214,14 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_no_joint_changes_is_told) {
   }
   clearances.nearest[0] = -1;
   BOOST_TEST(
-      (filter.solve({.q = zero, .v = zero, .acceleration = zero, .clearances = &clearances}, solution) == TorqueStatus::ok));
+      (filter.solve({.q = zero, .v = zero, .acceleration = zero, .clearances = &clearances}, solution) == ProgramStatus::ok));
   BOOST_TEST(solution.least_coordinate == -1);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   // The mean is above zero and fast on its way out: the program has nothing to do, but an ellipsoid is still inside.
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   Clearances clearances(nv, 1);
   clearances.nearest[0] = 0;
@@ -231,7 +231,7 @@ BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   clearances.mind_nearest();
   clearances.least[0] = -0.001;
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
-  BOOST_TEST((controller.solve({zero, zero, zero, M, zero, &clearances}, solution) == TorqueStatus::clearance_lost));
+  BOOST_TEST((controller.solve({zero, zero, zero, M, zero, &clearances}, solution) == ProgramStatus::clearance_lost));
   BOOST_TEST(solution.least_clearance == -0.001);
 }
 

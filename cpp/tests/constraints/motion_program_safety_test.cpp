@@ -25,7 +25,7 @@ struct Approach {
     clearances.rates[1] = -0.1;
     clearances.gradients(2, 1) = 0.5;
   }
-  TorqueStatus solve(MotionProgram& controller, TorqueSolution& solution) {
+  ProgramStatus solve(MotionProgram& controller, MotionSolution& solution) {
     clearances.mind_nearest();
     return controller.solve({q, v, a, M, h, &clearances}, solution);
   }
@@ -41,10 +41,10 @@ struct Approach {
 
 BOOST_AUTO_TEST_CASE(a_clearance_bends_the_task) {
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Approach in;
   in.a.setConstant(-5.0);
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::limited));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::limited));
   BOOST_TEST(in.required() > 3.9);  // 20 · 0.1 m/s² along the line
   BOOST_TEST(in.required() < 4.0);
   // Rounding of an acceleration around 5.
@@ -63,13 +63,13 @@ BOOST_AUTO_TEST_CASE(a_clearance_bends_the_task) {
 
 BOOST_AUTO_TEST_CASE(a_clearance_that_is_kept_anyway_changes_nothing) {
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution with(nv), without(nv);
+  MotionSolution with(nv), without(nv);
   Approach in;
   in.a.setConstant(4.5);
-  BOOST_TEST((in.solve(controller, with) == TorqueStatus::ok));
+  BOOST_TEST((in.solve(controller, with) == ProgramStatus::ok));
   BOOST_TEST(with.dominant == -1);
   BOOST_TEST(with.num_safety_rows == 1);
-  BOOST_TEST((controller.solve({in.q, in.v, in.a, in.M, in.h}, without) == TorqueStatus::ok));
+  BOOST_TEST((controller.solve({in.q, in.v, in.a, in.M, in.h}, without) == ProgramStatus::ok));
   BOOST_TEST((with.torque.array() == without.torque.array()).all());
   BOOST_TEST(without.num_safety_rows == 0);
 }
@@ -77,12 +77,12 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_is_kept_anyway_changes_nothing) {
 BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   // Something comes, with a curvature of -9: 0.5 q̈_2 >= 9 + 2 asks for 22 /s², the limit is 10. Torque allows 87.
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Approach in;
   in.v.setZero();
   in.clearances.curvatures[1] = -9.0;
   const double asked = in.required() + 18.0;
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::relaxed));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::relaxed));
   BOOST_TEST(solution.acceleration[2] == asked, boost::test_tools::tolerance(1e-9));  // the second program's prices
   BOOST_TEST(solution.slack[2] == asked - 10.0, boost::test_tools::tolerance(1e-9));
   BOOST_TEST(solution.safety[0].slack == 0.0);
@@ -92,7 +92,7 @@ BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   MotionProgramSettings settings;
   settings.hard_bounds = true;
   MotionProgram hard(test::serial_arm(test::arm_limits(nv)), settings);
-  BOOST_TEST((in.solve(hard, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST((in.solve(hard, solution) == ProgramStatus::relaxed_safety));
   BOOST_TEST(solution.acceleration[2] == 10.0, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(solution.safety[0].slack == 0.5 * (asked - 10.0), boost::test_tools::tolerance(1e-9));
 }
@@ -105,7 +105,7 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot
   MotionProgramSettings settings;
   settings.hard_bounds = true;
   MotionProgram controller(test::serial_arm(limits), settings);
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Approach in;
   in.v.setZero();
   in.clearances.curvatures[1] = -9.0;
@@ -114,7 +114,7 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot
   in.clearances.rates[0] = -0.1;
   in.clearances.gradients(0, 0) = -0.5;
   in.a[0] = 1900.0;
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::relaxed_safety));
   BOOST_TEST(solution.num_safety_rows == 2);
   BOOST_TEST(solution.acceleration[2] == 10.0, boost::test_tools::tolerance(1e-9));
   for (int k = 0; k < 2; ++k) {
@@ -131,13 +131,13 @@ BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot
 
 BOOST_AUTO_TEST_CASE(torque_limits_stand_above_clearances) {
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Approach in;
   in.v.setZero();
   in.clearances.curvatures[1] = -9.0;
   in.h[2] = 80.0;  // of 87
   in.a[0] = 1.0;
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::relaxed_safety));
   BOOST_TEST(solution.torque[2] == 87.0);
   BOOST_TEST(contains(solution.active[2], Limit::torque_upper));
   BOOST_TEST(solution.acceleration[2] == 7.0, boost::test_tools::tolerance(1e-9));
@@ -151,13 +151,13 @@ BOOST_AUTO_TEST_CASE(torque_limits_stand_above_clearances) {
 BOOST_AUTO_TEST_CASE(position_limits_are_not_given_up_for_comfort) {
   // The clearance wants joint 2 upwards with 22 /s², and 1 µrad is left to its position limit.
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Approach in;
   in.clearances.curvatures[1] = -9.0;
   in.clearances.gradients(3, 1) = 0.2;  // joint 3 could help, with 55 /s²
   in.q[2] = 2.5 - 1e-6;
   in.v[2] = 0.0;
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::relaxed));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::relaxed));
   const double reach = 1e-6 / (0.001 * 0.001);  // semi-implicit Euler reaches the limit with it, less braking
   BOOST_TEST(solution.acceleration[2] <= reach);
   BOOST_TEST(solution.safety[0].slack == 0.0);
@@ -167,12 +167,12 @@ BOOST_AUTO_TEST_CASE(position_limits_are_not_given_up_for_comfort) {
 
 BOOST_AUTO_TEST_CASE(unusable_clearances_stop_the_arm) {
   MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
-  TorqueSolution solution(nv), stop(nv);
+  MotionSolution solution(nv), stop(nv);
   Approach in;
   in.a.setConstant(5.0);
   in.clearances.rates[1] = std::numeric_limits<double>::quiet_NaN();
-  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::fallback_invalid_input));
-  BOOST_TEST((solution.fault == TorqueFault::clearances));
+  BOOST_TEST((in.solve(controller, solution) == ProgramStatus::fallback_invalid_input));
+  BOOST_TEST((solution.fault == ProgramFault::clearances));
   BOOST_TEST(solution.num_safety_rows == 0);
   in.a = -in.v / controller.settings().stop_time;
   static_cast<void>(controller.solve({in.q, in.v, in.a, in.M, in.h}, stop));
@@ -184,7 +184,7 @@ BOOST_AUTO_TEST_CASE(many_clearances_on_every_path_are_optimal_or_reported_and_n
   int stops = 0;
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram controller(test::serial_arm(limits));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 3000; ++trial) {
     const int num = random.integer(0, 40);
     Clearances clearances(nv, num);
@@ -209,7 +209,7 @@ BOOST_AUTO_TEST_CASE(many_clearances_on_every_path_are_optimal_or_reported_and_n
     const Eigen::MatrixXd M = test::random_mass(random, nv);
     BOOST_REQUIRE_EQUAL(
         test::allocations_of([&] { static_cast<void>(controller.solve({q, v, a, M, h, &clearances}, solution)); }), 0u);
-    BOOST_REQUIRE(solution.status <= TorqueStatus::relaxed_safety);
+    BOOST_REQUIRE(solution.status <= ProgramStatus::relaxed_safety);
     BOOST_REQUIRE((solution.torque.array().abs() <= limits.effort.array()).all());
     double worst = 0.0;
     for (int n = 0; n < solution.num_safety_rows; ++n) {
@@ -221,15 +221,15 @@ BOOST_AUTO_TEST_CASE(many_clearances_on_every_path_are_optimal_or_reported_and_n
       BOOST_REQUIRE_SMALL(std::max(row.required - given, 0.0) - row.slack, 1e-6);
       worst = std::max(worst, row.slack);
     }
-    if (solution.status <= TorqueStatus::relaxed) {
+    if (solution.status <= ProgramStatus::relaxed) {
       BOOST_REQUIRE_EQUAL(worst, 0.0);
     }
-    if (solution.status <= TorqueStatus::limited) {
+    if (solution.status <= ProgramStatus::limited) {
       BOOST_REQUIRE_EQUAL(solution.slack.norm(), 0.0);
     }
   }
-  for (const TorqueStatus status :
-       {TorqueStatus::ok, TorqueStatus::limited, TorqueStatus::relaxed, TorqueStatus::relaxed_safety}) {
+  for (const ProgramStatus status :
+       {ProgramStatus::ok, ProgramStatus::limited, ProgramStatus::relaxed, ProgramStatus::relaxed_safety}) {
     BOOST_TEST(controller.count(status) > 20, name(status));
   }
   BOOST_TEST(stops > 20);

@@ -48,7 +48,7 @@ BOOST_AUTO_TEST_CASE(walls_in_joint_space_are_never_passed) {
   Random random(0);
   const JointLimits limits = test::arm_limits(nv);
   const double margin = SafetySettings().margin;
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 40; ++trial) {
     MotionProgram filter(test::serial_arm(limits), test::without_torque());
     const Walls walls(random, random.integer(1, 12), 0.0);
@@ -67,16 +67,16 @@ BOOST_AUTO_TEST_CASE(walls_in_joint_space_are_never_passed) {
       q += 0.001 * v;
     }
     // Where a corner of several walls asks for more than the joints have, what is missing costs a little.
-    BOOST_TEST(lowest >= margin - (filter.count(TorqueStatus::relaxed_safety) > 0 ? 2e-3 : 1e-9));
-    BOOST_TEST(filter.count(TorqueStatus::limited) > 100);
-    BOOST_TEST(filter.count(TorqueStatus::fallback_solver) == 0);
+    BOOST_TEST(lowest >= margin - (filter.count(ProgramStatus::relaxed_safety) > 0 ? 2e-3 : 1e-9));
+    BOOST_TEST(filter.count(ProgramStatus::limited) > 100);
+    BOOST_TEST(filter.count(ProgramStatus::fallback_solver) == 0);
   }
 }
 
 BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
   Random random(1);
   const JointLimits limits = test::arm_limits(nv);
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 40; ++trial) {
     MotionProgram filter(test::serial_arm(limits), test::without_torque());
     Walls walls(random, 1, 0.0);
@@ -88,7 +88,7 @@ BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
       lowest = std::min(lowest, clearances.values[0]);
       const Eigen::VectorXd wanted = -100.0 * q - 20.0 * v;  // wants to stay
       BOOST_REQUIRE(filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances}, solution) <=
-                    TorqueStatus::limited);
+                    ProgramStatus::limited);
       v += 0.001 * solution.acceleration;
       q += 0.001 * v;
     }
@@ -100,7 +100,7 @@ BOOST_AUTO_TEST_CASE(the_arm_yields_to_a_wall_that_moves) {
 BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Clearances clearances(nv, 2);
   clearances.nearest << -1, 5;
   clearances.values[1] = 0.01;
@@ -109,8 +109,8 @@ BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   clearances.gradients(2, 1) = 0.5;
   clearances.mind_nearest();
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;  // something comes
-  BOOST_TEST(
-      (filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = a, .clearances = &clearances}, solution) ==
+              ProgramStatus::relaxed_safety));
   BOOST_TEST(solution.acceleration[2] == 10.0);
   BOOST_TEST(contains(solution.active[2], Limit::acceleration_upper));
   BOOST_REQUIRE(solution.num_safety_rows == 1);
@@ -123,7 +123,7 @@ BOOST_AUTO_TEST_CASE(without_clearances_only_the_joint_limits_count) {
   Random random(2);
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 1000; ++trial) {
     const Eigen::VectorXd q = (2.0 * random.vector(nv)).cwiseMax(limits.lower).cwiseMin(limits.upper);
     const Eigen::VectorXd v = random.vector(nv).cwiseMax(-limits.velocity).cwiseMin(limits.velocity);
@@ -138,7 +138,7 @@ BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is
   Random random(3);
   const JointLimits limits = test::arm_limits(nv);
   MotionProgram filter(test::serial_arm(limits), test::without_torque());
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   for (int trial = 0; trial < 2000; ++trial) {
     const Walls walls(random, random.integer(0, 40), 0.3);
     Eigen::VectorXd q = 0.6 * random.vector(nv), v = random.vector(nv), a = 20.0 * random.vector(nv);
@@ -157,10 +157,10 @@ BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is
     BOOST_REQUIRE(solution.acceleration.allFinite());
     BOOST_REQUIRE((solution.acceleration.array().abs() <= limits.acceleration.array()).all());
   }
-  for (const TorqueStatus status :
-       {TorqueStatus::ok, TorqueStatus::limited, TorqueStatus::relaxed_safety, TorqueStatus::fallback_invalid_input}) {
+  for (const ProgramStatus status :
+       {ProgramStatus::ok, ProgramStatus::limited, ProgramStatus::relaxed_safety, ProgramStatus::fallback_invalid_input}) {
     BOOST_TEST(filter.count(status) > 0, name(status));
   }
-  BOOST_TEST(filter.count(TorqueStatus::relaxed) == 0);
-  BOOST_TEST(filter.count(TorqueStatus::fallback_solver) == 0);
+  BOOST_TEST(filter.count(ProgramStatus::relaxed) == 0);
+  BOOST_TEST(filter.count(ProgramStatus::fallback_solver) == 0);
 }

@@ -59,7 +59,7 @@ class AbovePlane : public Constraint {
 
 /// The least height of the tip in 2.5 s in which the arm is driven to bend over.
 double least_height(const Robot& arm, MotionProgram& program) {
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, wanted = q;
   const Eigen::VectorXd bias = q;
   const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(nv, nv);
@@ -69,8 +69,8 @@ double least_height(const Robot& arm, MotionProgram& program) {
   for (int k = 0; k < 2500; ++k) {
     BOOST_REQUIRE_EQUAL(test::allocations_of([&] { static_cast<void>(program.solve({q, v, wanted, mass, bias}, solution)); }),
                         0u);
-    BOOST_REQUIRE_MESSAGE(solution.status <= TorqueStatus::limited, name(solution.status)
-                                                                        << " in step " << k << ", " << least << " m");
+    BOOST_REQUIRE_MESSAGE(solution.status <= ProgramStatus::limited, name(solution.status)
+                                                                         << " in step " << k << ", " << least << " m");
     q += 0.001 * v + 0.5e-6 * solution.acceleration;
     v += 0.001 * solution.acceleration;
     state.update(arm, q, v);
@@ -107,11 +107,11 @@ struct OnFirstJoint : Constraint {
 };
 
 /// The acceleration of joint 0 that a program gives which wants none.
-double first_acceleration(const Robot& arm, bool by_torque, MotionProgram::Constraints own, TorqueStatus expected) {
+double first_acceleration(const Robot& arm, bool by_torque, MotionProgram::Constraints own, ProgramStatus expected) {
   MotionProgramSettings settings;
   settings.by_torque = by_torque;
   MotionProgram program(arm, settings, std::move(own));
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(nv, nv);
   BOOST_TEST((program.solve({zero, zero, zero, mass, zero}, solution) == expected), name(solution.status));
@@ -170,25 +170,25 @@ BOOST_AUTO_TEST_CASE(rows_of_ones_own_give_way_by_their_priority) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   // Kept where they can be.
   for (const P p : {P::never, P::clearance, P::comfort}) {
-    BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(p, 2.0, inf)), TorqueStatus::limited) == 2.0, close);
-    BOOST_TEST(first_acceleration(arm, false, list(OnFirstJoint(p, -inf, -3.0)), TorqueStatus::limited) == -3.0, close);
+    BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(p, 2.0, inf)), ProgramStatus::limited) == 2.0, close);
+    BOOST_TEST(first_acceleration(arm, false, list(OnFirstJoint(p, -inf, -3.0)), ProgramStatus::limited) == -3.0, close);
   }
   // Of two clearances that contradict each other each falls short by the same.
-  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::clearance, 5.0, 1.0)), TorqueStatus::relaxed_safety) == 3.0,
+  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::clearance, 5.0, 1.0)), ProgramStatus::relaxed_safety) == 3.0,
              close);
   // Comfort gives way to clearances, clearances to what never does.
   BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::comfort, -inf, 1.0), OnFirstJoint(P::clearance, 4.0, inf)),
-                                TorqueStatus::relaxed) == 4.0,
+                                ProgramStatus::relaxed) == 4.0,
              close);
   BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::never, -inf, 1.0), OnFirstJoint(P::clearance, 4.0, inf)),
-                                TorqueStatus::relaxed_safety) == 1.0,
+                                ProgramStatus::relaxed_safety) == 1.0,
              close);
   // Acceleration limits of 10 give way to clearances, unless they are what drives can do.
-  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::clearance, 20.0, inf)), TorqueStatus::relaxed) == 20.0, close);
-  BOOST_TEST(first_acceleration(arm, false, list(OnFirstJoint(P::clearance, 20.0, inf)), TorqueStatus::relaxed_safety) == 10.0,
+  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::clearance, 20.0, inf)), ProgramStatus::relaxed) == 20.0, close);
+  BOOST_TEST(first_acceleration(arm, false, list(OnFirstJoint(P::clearance, 20.0, inf)), ProgramStatus::relaxed_safety) == 10.0,
              close);
   // What never gives way and contradicts itself leaves the damped stop.
-  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::never, 2.0, 1.0)), TorqueStatus::fallback_solver) == 0.0);
+  BOOST_TEST(first_acceleration(arm, true, list(OnFirstJoint(P::never, 2.0, 1.0)), ProgramStatus::fallback_solver) == 0.0);
 }
 
 BOOST_AUTO_TEST_CASE(rows_give_way_by_three_priorities_only) {

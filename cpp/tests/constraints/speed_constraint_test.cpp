@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(speed_gives_way_to_clearances_and_says_so) {
   MotionProgramSettings settings = test::without_torque();
   settings.limits_speed = true;
   MotionProgram filter(robot, settings);
-  TorqueSolution solution(nv);
+  MotionSolution solution(nv);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q;
   q[3] = 1.2;
   v[0] = 1.0;  // the tip moves by this times its distance from the first axis
@@ -124,14 +124,14 @@ BOOST_AUTO_TEST_CASE(speed_gives_way_to_clearances_and_says_so) {
   const FrameSpeeds::Fastest fastest = FrameSpeeds(robot).fastest(state);
   const SpeedLimitNow speed{&state, &robot.limits().acceleration, fastest.speed, fastest.speed};
   const Eigen::VectorXd wanted = 5.0 * Eigen::VectorXd::Unit(nv, 0);
-  BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = wanted, .speed = speed}, solution) == TorqueStatus::limited));
+  BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = wanted, .speed = speed}, solution) == ProgramStatus::limited));
   BOOST_TEST(solution.speed_frame == fastest.frame);
   BOOST_TEST(solution.speed_slack == 0.0);
   const auto speed_after = [&] {
     return speed_of(robot, fastest.frame, q + speed_period * v, v + speed_period * solution.acceleration);
   };
   BOOST_TEST(speed_after() <= fastest.speed);
-  BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = wanted}, solution) == TorqueStatus::ok));
+  BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = wanted}, solution) == ProgramStatus::ok));
   BOOST_TEST(speed_after() > fastest.speed + 1e-3);
 
   Clearances clearances(nv, 1);  // what comes at 1 m/s asks for a faster turn of the first joint
@@ -141,7 +141,7 @@ BOOST_AUTO_TEST_CASE(speed_gives_way_to_clearances_and_says_so) {
   clearances.rates[0] = -1.0;
   clearances.mind_nearest();
   BOOST_TEST((filter.solve({.q = q, .v = v, .acceleration = wanted, .clearances = &clearances, .speed = speed}, solution) ==
-              TorqueStatus::relaxed));
+              ProgramStatus::relaxed));
   BOOST_TEST(solution.speed_slack > 1.0);
   BOOST_TEST(solution.speed_frame >= 0);
   BOOST_TEST(std::abs(solution.acceleration[0] - robot.limits().acceleration[0]) < 1e-6);

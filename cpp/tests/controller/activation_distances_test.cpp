@@ -14,7 +14,6 @@ struct Lowering {
   Lowering() { places.num = 1; }
   const ControllerModel model = test::stage_model(2, test::straight_settings(Output::position));
   ActivationDistances distances{model.system, model.clearances};
-  Eigen::VectorXd activations = model.system->activations();
   Places places{2};
   bool blocked = false;
 };
@@ -26,52 +25,55 @@ Obstacles beside_link(double distance) { return test::ball({0.04 + 0.03 + distan
 
 BOOST_AUTO_TEST_CASE(barriers_are_lowered_below_the_clearance_at_a_place_and_no_others) {
   Lowering l;
-  const Eigen::VectorXd usual = l.activations;
-  l.distances.update(l.places, beside_link(0.03), l.activations, l.blocked);
+  const Eigen::VectorXd usual = l.distances.values();
+  l.distances.update(l.places, beside_link(0.03), l.blocked);
   BOOST_TEST(!l.blocked);
   Eigen::Index lowered = 0;
   for (Eigen::Index k = 0; k < usual.size(); ++k) {
-    if (l.activations[k] < usual[k]) {
+    if (l.distances.values()[k] < usual[k]) {
       ++lowered;
       BOOST_TEST(l.model.system->labels()[static_cast<std::size_t>(k)].name == "link2");
-      BOOST_TEST(l.activations[k] <= 0.03);
-      BOOST_TEST(l.activations[k] > 0.02);  // no more than the mean over the body asks for, of a temperature of 2 mm
+      BOOST_TEST(l.distances.values()[k] <= 0.03);
+      BOOST_TEST(l.distances.values()[k] > 0.02);  // no more than the mean over the body asks for, of a temperature of 2 mm
     }
   }
   BOOST_TEST(lowered == 1);
-  l.distances.reset(l.activations);
-  BOOST_TEST((l.activations == usual));
+  l.distances.take(usual);
+  BOOST_TEST((l.distances.values() == usual));
 }
 
 BOOST_AUTO_TEST_CASE(a_place_inside_an_obstacle_is_blocked) {
   Lowering l;
-  l.distances.update(l.places, beside_link(-0.01), l.activations, l.blocked);
+  l.distances.update(l.places, beside_link(-0.01), l.blocked);
   BOOST_TEST(l.blocked);
-  l.distances.update(l.places, beside_link(0.01), l.activations, l.blocked);
+  l.distances.update(l.places, beside_link(0.01), l.blocked);
   BOOST_TEST(!l.blocked);
   GeometricSystem::Workspace other(*l.model.system);
-  BOOST_TEST(l.distances.lower_at(l.places, beside_link(-0.01), other, l.activations));
+  Eigen::VectorXd activations;
+  BOOST_TEST(l.distances.lower_at(l.places, beside_link(-0.01), other, activations));
+  l.distances.take(activations);
+  BOOST_TEST((l.distances.values() == activations));
 }
 
 BOOST_AUTO_TEST_CASE(nothing_is_looked_at_again_until_places_or_obstacles_are_others) {
   Lowering l;
   const Obstacles near = beside_link(0.03);
-  l.distances.update(l.places, near, l.activations, l.blocked);
-  const Eigen::VectorXd found = l.activations;
+  l.distances.update(l.places, near, l.blocked);
+  const Eigen::VectorXd found = l.distances.values();
   const auto looks = [&](const Obstacles& obstacles) {
-    l.activations.setZero();
-    l.distances.update(l.places, obstacles, l.activations, l.blocked);
-    return !l.activations.isZero(0.0);
+    l.blocked = true;  // A look finds that it is not.
+    l.distances.update(l.places, obstacles, l.blocked);
+    return !l.blocked;
   };
   BOOST_TEST(!looks(near));
   BOOST_TEST(looks(beside_link(0.03)));  // others, in the same place
   const Obstacles again = beside_link(0.03);
   BOOST_TEST(looks(again));
-  BOOST_TEST((l.activations == found));
+  BOOST_TEST((l.distances.values() == found));
   BOOST_TEST(!looks(again));
   l.distances.forget();
   BOOST_TEST(looks(again));
   l.places.q(1, 0) = 0.1;
   BOOST_TEST(looks(again));
-  BOOST_TEST((l.activations != found));
+  BOOST_TEST((l.distances.values() != found));
 }

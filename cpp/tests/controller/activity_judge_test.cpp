@@ -31,7 +31,9 @@ struct Judging {
   ActivityJudge::Evidence evidence() {
     tick.time += judged_period;
     const Goal& destination = request.goal() != nullptr ? *request.goal() : resting;
-    return {request, destination, follower, follower.led_goal(), arm, kinematics, StepStatus::ok, tick};
+    ActivityJudge::Evidence now{request, destination, follower, follower.led_goal(), arm, kinematics, StepStatus::ok, tick};
+    now.target_blocked = blocked;
+    return now;
   }
   Activity judge() { return judge_.judge(evidence()).activity; }
   /// Steps until that is said; -1: not within a second.
@@ -56,6 +58,7 @@ struct Judging {
   KinematicState kinematics{model.arm.robot()};
   ActivityJudge judge_{model.settings, model.joints, model.look_period};
   Tick tick = Tick::regular(judged_period);
+  bool blocked = false;  // the target
 };
 
 }  // namespace
@@ -88,18 +91,18 @@ BOOST_AUTO_TEST_CASE(a_pose_is_reached_where_its_frame_is) {
 BOOST_AUTO_TEST_CASE(no_way_has_to_stay_for_a_fifth_of_a_second_before_the_arm_is_blocked_and_half_as_long_to_be_free) {
   Judging j;
   j.judge();
-  j.follower.set_target_blocked(true);
+  j.blocked = true;
   // A period of rounding; the first of them begins the time.
   BOOST_TEST(std::abs(j.steps_until(Activity::blocked) - 201) <= 1);
-  j.follower.set_target_blocked(false);
+  j.blocked = false;
   BOOST_TEST(std::abs(j.steps_until(Activity::moving) - 101) <= 1);
-  j.follower.set_target_blocked(true);
+  j.blocked = true;
   for (int k = 0; k < 150; ++k) {
     BOOST_TEST((j.judge() == Activity::moving));
   }
-  j.follower.set_target_blocked(false);  // a look that says otherwise: the time begins anew
+  j.blocked = false;  // a look that says otherwise: the time begins anew
   j.judge();
-  j.follower.set_target_blocked(true);
+  j.blocked = true;
   BOOST_TEST(j.steps_until(Activity::blocked) >= 200);
   j.judge_.forget(j.tick.time);  // another goal
   BOOST_TEST((j.judge() == Activity::moving));

@@ -17,7 +17,7 @@ struct Attracting {
   Attracting() : closing(test::no_closing(model)) {}
   Eigen::VectorXd attract(const Lead& lead, const Obstacles& obstacles = Obstacles::none()) {
     Eigen::VectorXd wanted = Eigen::VectorXd::Zero(2);
-    status = stage.attract(lead, reference, obstacles, closing, Tick::regular(0.001), wanted);
+    status = stage.attract(lead, model.system->activations(), reference, obstacles, closing, Tick::regular(0.001), wanted);
     return wanted;
   }
 

@@ -129,7 +129,7 @@ BOOST_AUTO_TEST_CASE(clearances_bound_commands_whatever_the_goal_is) {
       static_cast<void>(controller.step(q, v));
     }
     const Command& command = controller.step(q, v);
-    BOOST_TEST(controller.solution().num_safety_rows > 0);
+    BOOST_TEST(controller.part_results().solution.num_safety_rows > 0);
     BOOST_TEST(command.clearance < 0.05);
     BOOST_TEST((command.activity == (kind == 0 ? Activity::no_goal : kind == 1 ? Activity::moving : Activity::blocked)));
   }

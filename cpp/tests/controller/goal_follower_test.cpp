@@ -26,6 +26,7 @@ struct Leading {
   RequestBoard board{nv};
   GoalFollower follower{model.body, model.settings, model.joints, model.dynamics, board, false};
   Reference reference{nv};
+  TargetFindings findings;
   Tick tick = Tick::regular(0.001);
 };
 
@@ -38,20 +39,19 @@ BOOST_AUTO_TEST_CASE(a_joint_goal_is_led_to_straight_and_the_same_again_is_no_ot
   Goal goal = JointGoal(led_to);
   l.follower.leave(true);
   BOOST_TEST(l.follower.begins_goal());
-  BOOST_TEST((l.follower.way(0.0, nullptr) == Way::unknown));
+  BOOST_TEST((l.follower.way(0.0, nullptr, false) == Way::unknown));
   BOOST_TEST(l.follower.begin(goal, false, l.now()));
   BOOST_TEST(!l.follower.begins_goal());
   BOOST_TEST(!l.follower.begin(goal, false, l.now()));
-  const Goal& led = l.follower.lead(nullptr, l.now(), false);
+  const Goal& led = l.follower.lead(nullptr, l.now(), false, l.findings);
   BOOST_TEST((&led == l.follower.led_goal()));
   BOOST_TEST((std::get<JointGoal>(led).position == led_to));
   BOOST_TEST(std::get<JointGoal>(led).velocity.isZero(0.0));
   BOOST_TEST(l.follower.is_led_to_target());
   BOOST_TEST(l.follower.reaches_goal());
-  BOOST_TEST((l.follower.way(0.0, &led) == Way::open));
-  l.follower.set_target_blocked(true);
-  BOOST_TEST(l.follower.stops_short(&led));
-  BOOST_TEST((l.follower.way(0.0, &led) == Way::none));
+  BOOST_TEST((l.follower.way(0.0, &led, false) == Way::open));
+  BOOST_TEST(l.follower.stops_short(&led, true));
+  BOOST_TEST((l.follower.way(0.0, &led, true) == Way::none));
   Places places(nv);
   l.follower.write_places(places);
   BOOST_TEST(places.num == 1);
@@ -86,10 +86,11 @@ BOOST_AUTO_TEST_CASE(a_pose_is_led_to_by_a_posture_and_by_another_one_where_that
   BOOST_TEST(error().rotation < 1e-7);
   BOOST_TEST((l.board.fault() == ""));
   const Eigen::VectorXd first = l.follower.target_position();
-  l.follower.lead(&pose, l.now(0.1), false);
+  l.follower.lead(&pose, l.now(0.1), false, l.findings);
   BOOST_TEST(l.follower.attempt() == 0u);
-  l.follower.set_target_blocked(true);
-  const Goal& led = l.follower.lead(&pose, l.now(0.2), false);
+  l.findings = {.blocked = true, .rests = true};
+  const Goal& led = l.follower.lead(&pose, l.now(0.2), false, l.findings);
+  BOOST_TEST((!l.findings.blocked && !l.findings.rests));
   BOOST_TEST(l.follower.attempt() == 1u);
   BOOST_TEST((l.follower.target_position() - first).cwiseAbs().maxCoeff() > 0.1);  // another one, not the same by rounding
   BOOST_TEST(error().position < 1e-7);
@@ -108,14 +109,15 @@ BOOST_AUTO_TEST_CASE(a_worker_is_asked_once_for_a_posture_and_its_answer_to_anot
   const GoalFollower::Moment now{reference, reference.q, obstacles, tick, 1};
   const PoseGoal pose = test::pose_of(model.arm.robot(), led_to);
   Goal goal = pose;
+  TargetFindings findings;
   follower.begin(goal, false, now);
   BOOST_TEST(follower.asks());
   BOOST_TEST(follower.take_question());
   BOOST_TEST(!follower.take_question());
   follower.found_postures().put({0, 0, {led_to, 0.0, 0.0}});
-  BOOST_TEST((std::get<JointGoal>(follower.lead(&pose, now, false)).position == reference.q));  // it waits
+  BOOST_TEST((std::get<JointGoal>(follower.lead(&pose, now, false, findings)).position == reference.q));  // it waits
   BOOST_TEST((follower.taken().posture != nullptr));
   follower.found_postures().put({1, 0, {led_to, 0.0, 0.0}});
-  BOOST_TEST((std::get<JointGoal>(follower.lead(&pose, now, false)).position == led_to));
+  BOOST_TEST((std::get<JointGoal>(follower.lead(&pose, now, false, findings)).position == led_to));
   BOOST_TEST(follower.reaches_goal());
 }

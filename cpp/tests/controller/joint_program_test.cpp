@@ -22,7 +22,7 @@ struct Programming {
   const ControllerModel model;
   ArmDynamics dynamics;
   JointProgram program;
-  TorqueSolution solution{2};
+  MotionSolution solution{2};
   const Tick tick = Tick::regular(0.001);
   const Eigen::VectorXd q = Eigen::Vector2d(0.2, 0.7), v = Eigen::Vector2d::Zero();
 };
@@ -48,14 +48,14 @@ BOOST_AUTO_TEST_CASE(margins_leave_a_share_of_every_limit_but_position) {
 BOOST_AUTO_TEST_CASE(an_acceleration_within_limits_is_given_as_wanted_and_one_beyond_is_cut) {
   Programming p(Output::position);
   const Eigen::VectorXd wanted = Eigen::Vector2d(5.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::ok));
+  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == ProgramStatus::ok));
   BOOST_TEST((p.solution.acceleration - wanted).norm() < programmed);
   const Eigen::VectorXd much = Eigen::Vector2d(50.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, much, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::limited));
+  BOOST_TEST((p.program.solve(p.q, p.v, much, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == ProgramStatus::limited));
   BOOST_TEST((p.solution.acceleration - Eigen::Vector2d(9.8, -3.0)).norm() < programmed);
   const Eigen::VectorXd last = Eigen::Vector2d(0.0, 0.0);  // jerk: 1000 rad/s³ less 2 %
   BOOST_TEST(
-      (p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {&last}, p.tick, p.solution) == TorqueStatus::limited));
+      (p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {&last}, p.tick, p.solution) == ProgramStatus::limited));
   BOOST_TEST((p.solution.acceleration - Eigen::Vector2d(0.98, -0.98)).norm() < programmed);
   BOOST_TEST(p.program.jerk_share(p.tick) == 1.0);
 }
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(a_torque_is_that_of_the_acceleration_by_the_dynamics) {
   Programming p(Output::torque);
   p.dynamics.update(test::state_at(p.model.arm.robot(), p.q), {});
   const Eigen::VectorXd wanted = Eigen::Vector2d(5.0, -3.0);
-  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == TorqueStatus::ok));
+  BOOST_TEST((p.program.solve(p.q, p.v, wanted, p.dynamics, nullptr, {}, {}, p.tick, p.solution) == ProgramStatus::ok));
   // The price of torque costs tracking of about 1e-8 rad/s², see MotionProgramSettings.
   BOOST_TEST((p.solution.acceleration - wanted).norm() < 1e-7);
   const Eigen::VectorXd torque = p.dynamics.mass() * p.solution.acceleration + p.dynamics.bias();
@@ -87,8 +87,8 @@ BOOST_AUTO_TEST_CASE(an_arm_whose_state_is_unusable_is_stopped_with_the_torque_t
   p.dynamics.update(test::state_at(p.model.arm.robot(), p.q), {});
   const Eigen::VectorXd unknown = Eigen::VectorXd::Constant(2, test::not_a_number), rest = Eigen::VectorXd::Zero(2);
   BOOST_TEST((p.program.stop(unknown, unknown, rest, {}, p.dynamics, nullptr, p.tick, p.solution) ==
-              TorqueStatus::fallback_invalid_input));
-  BOOST_TEST((p.solution.fault == TorqueFault::position));
+              ProgramStatus::fallback_invalid_input));
+  BOOST_TEST((p.solution.fault == ProgramFault::position));
   BOOST_TEST((p.solution.torque - p.dynamics.bias()).norm() < programmed);  // gravity: no velocity is known to be damped
   const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(2, 2);
   const Eigen::VectorXd bias = Eigen::Vector2d(2.0, -1.0);
@@ -96,7 +96,7 @@ BOOST_AUTO_TEST_CASE(an_arm_whose_state_is_unusable_is_stopped_with_the_torque_t
   const Eigen::Ref<const Eigen::VectorXd> told_bias(bias);
   const ToldDynamics told{&told_mass, &told_bias};
   BOOST_TEST((p.program.stop(unknown, unknown, rest, told, p.dynamics, nullptr, p.tick, p.solution) ==
-              TorqueStatus::fallback_invalid_input));
+              ProgramStatus::fallback_invalid_input));
   BOOST_TEST((p.solution.torque - bias).norm() < programmed);
 }
 

@@ -84,7 +84,7 @@ Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& 
     if (distance < 0.2) {
       motion.fastest_near = std::max(motion.fastest_near, speed);
     }
-    if (controller.solution().speed_frame >= 0) {
+    if (controller.part_results().solution.speed_frame >= 0) {
       ++motion.slowed;
       if (motion.words.empty()) {
         motion.words = controller.explain();
@@ -182,7 +182,7 @@ BOOST_AUTO_TEST_CASE(the_limit_is_held_on_a_path_of_the_planner_without_allocati
     const Command& command = controller.command();
     BOOST_REQUIRE(command.speed <= command.speed_limit);
     on_path += command.on_path;
-    slowed += controller.solution().speed_frame >= 0;
+    slowed += controller.part_results().solution.speed_frame >= 0;
     arrived = command.activity == Activity::arrived;
     v += settings.period * command.acceleration;
     q += settings.period * v;

@@ -76,7 +76,7 @@ BOOST_AUTO_TEST_CASE(reference_and_arm_have_the_same_limit_and_the_words_name_wh
   const double next = l.model.settings.speed_limits->allowed(0.298);  // it closes by 1 mm in a period
   BOOST_TEST(std::abs(reference.next_limit - next) < 1e-7);           // in single precision, as above
   BOOST_TEST(arm.next_limit == reference.next_limit);
-  TorqueSolution solution(2);
+  MotionSolution solution(2);
   const Obstacles named = test::ball({0.5, 0.0, 0.75}, 0.1).named({"person"}, {1});
   BOOST_TEST(l.limiter.explain(l.command, solution, named) == "");
   solution.speed_frame = l.model.arm.robot().frame_index("tip");

@@ -248,7 +248,7 @@ BOOST_AUTO_TEST_CASE(clearances_bind_whatever_the_goal_is) {
           const Command& command = controller.step(q, v);
           BOOST_REQUIRE(command.clearance > 0.0);
           BOOST_REQUIRE(command.status < SafetyStatus::stopping);
-          bound = bound || controller.solution().num_safety_rows > 0;
+          bound = bound || controller.part_results().solution.num_safety_rows > 0;
           v += settings.period * command.acceleration;
           q += settings.period * v;
         }

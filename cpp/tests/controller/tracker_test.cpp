@@ -30,7 +30,7 @@ struct Tracking {
     limits.effort_rate.setConstant(effort_rate);
     return test::covered_arm(limits);
   }
-  TorqueStatus track(const Reference& reference, TorqueStatus decided = TorqueStatus::ok) {
+  ProgramStatus track(const Reference& reference, ProgramStatus decided = ProgramStatus::ok) {
     const double error = (reference.q - q).cwiseAbs().maxCoeff();
     return tracker.track(reference, {q, v, seen, dynamics, last, any_speed}, error, decided, tick);
   }
@@ -54,12 +54,12 @@ BOOST_AUTO_TEST_CASE(feedback_is_a_damped_spring_around_the_reference) {
   const Eigen::VectorXd expected =  // 5.3 and −0.4 rad/s²
       reference.a + w * w * (reference.q - t.q) + 2.0 * t.model.settings.tracking.damping * w * (reference.v - t.v);
   t.last.acceleration = expected;  // jerk is in no way
-  BOOST_TEST((t.track(reference) == TorqueStatus::ok));
+  BOOST_TEST((t.track(reference) == ProgramStatus::ok));
   BOOST_TEST((t.tracker.solution().acceleration - expected).norm() < tracked);
   t.last.acceleration.setZero();
   static_cast<void>(t.track(reference));
   BOOST_TEST((t.tracker.solution().acceleration - Eigen::Vector2d(0.98, expected[1])).norm() < tracked);  // jerk
-  BOOST_TEST((t.track(reference, TorqueStatus::relaxed) == TorqueStatus::relaxed));  // what was decided stays
+  BOOST_TEST((t.track(reference, ProgramStatus::relaxed) == ProgramStatus::relaxed));  // what was decided stays
 }
 
 BOOST_AUTO_TEST_CASE(an_arm_that_cannot_follow_draws_the_reference_to_itself_beyond_what_is_free) {
@@ -133,7 +133,7 @@ BOOST_AUTO_TEST_CASE(an_impedance_is_a_spring_of_torque_for_arms_that_are_moved_
   const Clearances seen(2, model.system->num_embedding_coordinates());
   const LastOutput last(2);
   static_cast<void>(
-      tracker.track(reference, {q, rest, seen, dynamics, last, any_speed}, 0.002, TorqueStatus::ok, Tick::regular(0.001)));
+      tracker.track(reference, {q, rest, seen, dynamics, last, any_speed}, 0.002, ProgramStatus::ok, Tick::regular(0.001)));
   // At rest K e + h is sent, K half of the effort limits per rad. The price of torque takes 1e-8 rad/s² of tracking at 1 kg m².
   const Eigen::VectorXd sent = 0.5 * model.arm.robot().limits().effort.cwiseProduct(error) + dynamics.bias();
   BOOST_TEST((tracker.solution().torque - sent).norm() < 1e-6);

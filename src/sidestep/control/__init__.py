@@ -6,13 +6,13 @@ from sidestep._core import (
     Clearances,
     Limit,
     MotionProgram,
+    MotionSolution,
     QuadraticProgram,
     QuadraticProgramData,
     QuadraticSolution,
     Robot,
     SafetyRow,
     SafetySettings,
-    TorqueSolution,
     acceleration_bounds,
 )
 
@@ -21,6 +21,7 @@ __all__ = [
     "Clearances",
     "Limit",
     "MotionProgram",
+    "MotionSolution",
     "QuadraticProgram",
     "QuadraticProgramData",
     "QuadraticSolution",
@@ -33,6 +34,9 @@ __all__ = [
 
 TorqueController = MotionProgram
 """The name of `MotionProgram` in 0.2."""
+
+TorqueSolution = MotionSolution
+"""The name of `MotionSolution` in 0.2."""
 
 
 class AccelerationFilter(MotionProgram):

@@ -8,6 +8,7 @@
 
 namespace sidestep {
 
+/// @cond internal
 /// State of the motion, from one step.
 enum class MotionState {
   free,             ///< Moving, with nothing in the way.
@@ -21,6 +22,7 @@ enum class MotionState {
 
 /// Short names, for example "blocked_at_goal".
 const char* name(MotionState state) noexcept;
+/// @endcond
 
 /// Thresholds, the same for every robot and scene.
 namespace judgement {

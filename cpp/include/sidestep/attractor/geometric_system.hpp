@@ -31,6 +31,7 @@ struct GeometricSystemSettings {
   PullForm pull_form = PullForm::metric;
 };
 
+/// @cond internal
 /// Status of a step.
 enum class StepStatus {
   ok,                   ///< The equations hold.
@@ -47,6 +48,7 @@ enum class StepStatus {
 constexpr bool is_fallback(StepStatus status) noexcept {
   return status == StepStatus::invalid_state || status == StepStatus::not_finite;
 }
+/// @endcond
 
 /// A damped spring that moves on the graph of ψ: obstacles bend its path (Bosc 2024, chapter 5).
 ///

@@ -106,6 +106,7 @@ bool advance(PoseGoal& goal, double duration) noexcept;
 /// Whether a goal has a velocity or an acceleration.
 bool is_moving(const Goal& goal) noexcept;
 
+/// @cond internal
 /// What is wrong with a goal.
 enum class GoalFault {
   none,
@@ -114,6 +115,7 @@ enum class GoalFault {
   out_of_reach,    ///< A position that the frame cannot reach in any configuration; the equations still hold.
 };
 GoalFault check(const Goal& goal, const Robot& robot) noexcept;
+/// @endcond
 
 /// Potential of a goal at a state, its gradient, and the distance to the goal. Made once, updated in every step.
 struct GoalPotential {

@@ -54,7 +54,7 @@ class ClearanceConstraints : public Constraint {
   void survey(const Moment& now, Survey& found) const noexcept override;
   void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept override;
   void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
-              TorqueSolution& solution) const noexcept override;
+              MotionSolution& solution) const noexcept override;
 
   /// Weakens each row to the least with which the current stop still fits into its distance, see clearance_demand.hpp. False: no row
   /// can be weakened. Only while no clearance is lost.

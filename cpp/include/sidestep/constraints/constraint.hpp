@@ -110,10 +110,10 @@ class Constraint {
   virtual void defer_recovery(const Moment&, RowBlock&) noexcept {}
 
   /// Removes rounding from the command. False: the command is outside its limits, and the solution is rejected.
-  virtual bool admit(TorqueSolution&) const noexcept { return true; }
+  virtual bool admit(MotionSolution&) const noexcept { return true; }
   /// Writes its effect into the solution, and raises the status if it gave way. wanted: acceleration that was solved for.
   virtual void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
-                      TorqueSolution& solution) const noexcept;
+                      MotionSolution& solution) const noexcept;
 };
 
 }  // namespace sidestep

@@ -19,7 +19,7 @@ struct DampedStop {
     bool mass_known;
   };
   /// Reads the bounds in the solution; writes torque, acceleration and active limits.
-  void apply(const State& state, TorqueSolution& solution) const noexcept;
+  void apply(const State& state, MotionSolution& solution) const noexcept;
 };
 
 }  // namespace sidestep

@@ -23,7 +23,7 @@ class HardProgram {
   void write_torque(const Eigen::MatrixXd& mass, const TorqueWindow& window) noexcept;
   /// Writes acceleration and active limits, and the multipliers of the blocks; false if there is no such acceleration.
   bool solve(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth, const Bounds& bounds,
-             std::vector<RowBlock>& blocks, TorqueSolution& solution) noexcept;
+             std::vector<RowBlock>& blocks, MotionSolution& solution) noexcept;
   const QuadraticProgramData& data() const noexcept { return data_; }
 
  private:

@@ -24,7 +24,7 @@ class JointLimitConstraint : public Constraint {
   void widen(Priority given_up, const Moment& now, Bounds& bounds) const noexcept override;
   /// Names the jerk limits that gave way.
   void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
-              TorqueSolution& solution) const noexcept override;
+              MotionSolution& solution) const noexcept override;
 
  private:
   void widen_to_limits(const Moment& now, Bounds& bounds) const noexcept;

@@ -105,7 +105,7 @@ class MotionProgram {
   MotionProgram(MotionProgram&&) = default;
 
   /// Writes all of `solution`, which must have been made for the same number of coordinates. A wrong size counts as invalid input.
-  [[nodiscard]] TorqueStatus solve(const MotionRequest& request, TorqueSolution& solution) noexcept;
+  [[nodiscard]] ProgramStatus solve(const MotionRequest& request, MotionSolution& solution) noexcept;
 
   const MotionProgramSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
@@ -115,7 +115,7 @@ class MotionProgram {
   /// The share of the jerk limits by which the torque keeps its rate with the last mass matrix, see torque_rate_constraint.hpp.
   double jerk_share(const MotionPeriods& periods = {}) const noexcept;
   /// Number of solves, since construction, that ended with this status.
-  std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
+  std::int64_t count(ProgramStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
  private:
   /// Usable parts of a request.
@@ -134,19 +134,19 @@ class MotionProgram {
   Known take(const MotionRequest& request) noexcept;
   bool take_mass(const MotionRequest& request) noexcept;
   /// Writes the bounds and rows of all constraints, or of those that the damped stop keeps.
-  void write(const Moment& now, const Known& known, TorqueSolution& solution) noexcept;
-  bool solve_hard(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth, TorqueSolution& solution) noexcept;
-  Search search(const Moment& now, TorqueSolution& solution) noexcept;
-  bool search_without_jerk(const Moment& now, TorqueSolution& solution) noexcept;
-  TorqueStatus solve_constrained(const Moment& now, bool usable, TorqueSolution& solution) noexcept;
+  void write(const Moment& now, const Known& known, MotionSolution& solution) noexcept;
+  bool solve_hard(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth, MotionSolution& solution) noexcept;
+  Search search(const Moment& now, MotionSolution& solution) noexcept;
+  bool search_without_jerk(const Moment& now, MotionSolution& solution) noexcept;
+  ProgramStatus solve_constrained(const Moment& now, bool usable, MotionSolution& solution) noexcept;
   /// Solves the programs after the first. smooth: within the jerk limits, which leave a solution.
-  TorqueStatus solve_relaxed(const Moment& now, bool smooth, TorqueSolution& solution) noexcept;
-  bool solve_slack(bool rounded, TorqueSolution& solution) noexcept;
+  ProgramStatus solve_relaxed(const Moment& now, bool smooth, MotionSolution& solution) noexcept;
+  bool solve_slack(bool rounded, MotionSolution& solution) noexcept;
   /// Status of a relaxed solution, by the bounds and rows that it violates; removes rounding.
-  TorqueStatus judge_relaxed(bool box_reached, TorqueSolution& solution) const noexcept;
+  ProgramStatus judge_relaxed(bool box_reached, MotionSolution& solution) const noexcept;
   /// Writes the torque of the solution's acceleration; false if it is beyond its limits.
-  bool accept(TorqueSolution& solution) const noexcept;
-  void stop(const Moment& now, bool mass_known, TorqueSolution& solution) const noexcept;
+  bool accept(MotionSolution& solution) const noexcept;
+  void stop(const Moment& now, bool mass_known, MotionSolution& solution) const noexcept;
   TrackingCost cost() const noexcept { return {mass_, bias_, wanted_, tracking_weight_, torque_cost_}; }
 
   int nv_;

@@ -8,8 +8,9 @@
 
 namespace sidestep {
 
+/// @cond internal
 /// How a solve ended, from best to worst. The command is safe to send after every one of them.
-enum class TorqueStatus {
+enum class ProgramStatus {
   ok,                      ///< The wanted acceleration is tracked, and no limit is in the way.
   limited,                 ///< Optimal within the limits, and at least one of them is in the way.
   relaxed,                 ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances,
@@ -21,11 +22,12 @@ enum class TorqueStatus {
 };
 
 /// Unusable input of a solve.
-enum class TorqueFault { none, position, velocity, acceleration, mass_matrix, bias, clearances };
+enum class ProgramFault { none, position, velocity, acceleration, mass_matrix, bias, clearances };
 
 /// Short names, for example "limited", "mass_matrix".
-const char* name(TorqueStatus status) noexcept;
-const char* name(TorqueFault fault) noexcept;
+const char* name(ProgramStatus status) noexcept;
+const char* name(ProgramFault fault) noexcept;
+/// @endcond
 
 /// Effect of one clearance on a solve.
 struct SafetyRow {
@@ -39,11 +41,11 @@ struct SafetyRow {
 };
 
 /// Result of a solve. Made once, written by every solve.
-struct TorqueSolution {
-  explicit TorqueSolution(int num_coordinates, int max_safety_rows = 32);
+struct MotionSolution {
+  explicit MotionSolution(int num_coordinates, int max_safety_rows = 32);
 
-  TorqueStatus status = TorqueStatus::ok;
-  TorqueFault fault = TorqueFault::none;
+  ProgramStatus status = ProgramStatus::ok;
+  ProgramFault fault = ProgramFault::none;
   Eigen::VectorXd torque;         ///< Torque [Nm | N], within the effort limits, always finite.
   Eigen::VectorXd acceleration;   ///< Acceleration M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable.
   Eigen::VectorXd slack;          ///< Acceleration beyond its bounds [/s^2], signed; 0 unless relaxed.

@@ -7,7 +7,7 @@
 
 namespace sidestep {
 
-struct TorqueSolution;
+struct MotionSolution;
 
 /// Consecutive rows or variables of a quadratic program.
 struct Span {
@@ -45,6 +45,6 @@ struct JointMultipliers {
 };
 /// Adds the limits in the way of joint i to solution.active; smooth: those of an interval with the jerk limit.
 void add_active(const Bounds& bounds, bool smooth, int i, const JointMultipliers& multipliers,
-                TorqueSolution& solution) noexcept;
+                MotionSolution& solution) noexcept;
 
 }  // namespace sidestep

@@ -21,7 +21,7 @@ class ShortfallProgram {
   };
   /// Writes the granted shortfalls, an acceleration within them, and the multipliers.
   Found solve(const TrackingCost& cost, Bounds& bounds, std::vector<RowBlock>& blocks, ShortRows& short_rows,
-              TorqueSolution& solution) noexcept;
+              MotionSolution& solution) noexcept;
 
  private:
   /// Over x = (q̈, r): the torque rows, normals q̈ + r >= required for up to `capacity` rows.
@@ -38,8 +38,8 @@ class ShortfallProgram {
              const ShortRows& short_rows, double deepest) noexcept;
   /// of_lost: of the rows that are violated already, while the others keep what they have.
   bool solve(Program& program, bool of_lost, const TrackingCost& cost, const Bounds& bounds, ShortRows& short_rows,
-             TorqueSolution& solution) noexcept;
-  bool widen(const TrackingCost& cost, const std::vector<RowBlock>& blocks, Bounds& bounds, TorqueSolution& solution) noexcept;
+             MotionSolution& solution) noexcept;
+  bool widen(const TrackingCost& cost, const std::vector<RowBlock>& blocks, Bounds& bounds, MotionSolution& solution) noexcept;
 
   int nv_;
   std::vector<Program> programs_;  // Programs by number of rows, so that the usual few stay cheap.

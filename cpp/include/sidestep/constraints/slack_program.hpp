@@ -13,12 +13,12 @@ class SlackProgram {
 
   /// `hard`: where cost and torque rows are taken from. Writes acceleration and active limits, and the multipliers of the blocks.
   bool solve(const QuadraticProgramData& hard, const TrackingCost& cost, const Bounds& bounds, const ShortRows& short_rows,
-             bool rounded, std::vector<RowBlock>& blocks, TorqueSolution& solution) noexcept;
+             bool rounded, std::vector<RowBlock>& blocks, MotionSolution& solution) noexcept;
 
  private:
   void write(const QuadraticProgramData& hard, const TrackingCost& cost, const Bounds& bounds) noexcept;
   void read(const Bounds& bounds, const ShortRows& short_rows, std::vector<RowBlock>& blocks,
-            TorqueSolution& solution) noexcept;
+            MotionSolution& solution) noexcept;
 
   double slack_weight_;
   SpanCounter variables_, counter_;

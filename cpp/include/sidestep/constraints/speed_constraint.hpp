@@ -75,7 +75,7 @@ class SpeedConstraint : public Constraint {
   void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept override;
   /// Names the frame that is slowed most.
   void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
-              TorqueSolution& solution) const noexcept override;
+              MotionSolution& solution) const noexcept override;
 
   const std::vector<int>& frames() const noexcept { return frames_; }  ///< Frame of each row.
 

@@ -13,7 +13,7 @@ class TorqueConstraint : public Constraint {
   int max_rows() const noexcept override { return 0; }
   void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept override;
   /// Clamps a torque that exceeds its limit by rounding.
-  bool admit(TorqueSolution& solution) const noexcept override;
+  bool admit(MotionSolution& solution) const noexcept override;
 
  private:
   JointLimits limits_;

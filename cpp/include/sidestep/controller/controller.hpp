@@ -36,6 +36,17 @@ enum class TwistFreedom {
   rotation,  ///< only the velocity of the frame's origin is commanded; its rotation is free
 };
 
+namespace detail {
+
+/// How the parts of the last step ended, for tests and bindings; Command::status is what counts.
+struct PartResults {
+  StepStatus attraction;           ///< Status of the geometric system.
+  ProgramStatus program;           ///< Status of the quadratic program.
+  const MotionSolution& solution;  ///< Its solution.
+};
+
+}  // namespace detail
+
 /// The controller turns the arm's state into a safe command, once per period.
 ///
 ///   1. Reference: the goal, a point ahead of the arm on the planner's path, or a sub-goal out of a local minimum.
@@ -197,12 +208,9 @@ class Controller {
   const std::vector<CoordinateLabel>& labels() const noexcept;
   const GeometricSystem& system() const noexcept;
   const GeometricSystem::Workspace& workspace() const noexcept;
-  /// How the geometric system ended in the last step.
-  StepStatus attraction_status() const noexcept;
-  /// How the quadratic program ended in the last step.
-  TorqueStatus program_status() const noexcept;
-  /// The quadratic program's solution of the last step.
-  const TorqueSolution& solution() const noexcept;
+  /// @cond internal
+  detail::PartResults part_results() const noexcept;
+  /// @endcond
   /// The target configuration: the goal, or the posture of a pose goal; empty if none is known. Only for the thread of
   /// `step`; allocates.
   Eigen::VectorXd target() const;

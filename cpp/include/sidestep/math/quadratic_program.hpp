@@ -5,6 +5,7 @@
 
 namespace sidestep {
 
+/// @cond internal
 /// How a solve ended. Only after `solved` is the solution meaningful.
 enum class QuadraticProgramStatus {
   solved,
@@ -17,6 +18,7 @@ enum class QuadraticProgramStatus {
 
 /// A short name, for example "solved".
 const char* name(QuadraticProgramStatus status) noexcept;
+/// @endcond
 
 /// The data of   minimise 1/2 x'Hx + g'x   subject to   lower <= x <= upper,   row_lower <= A x <= row_upper.
 /// Bounds may be infinite; equal bounds make an equality. Starts as H = I, g = 0, A = 0 and no bounds.

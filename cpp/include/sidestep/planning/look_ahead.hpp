@@ -141,7 +141,7 @@ class LookAhead {
   Eigen::MatrixXd mass_;  // Mass matrix of the predicted state.
   Eigen::VectorXd bias_;
   Stepper fine_, coarse_;
-  TorqueSolution filtered_;
+  MotionSolution filtered_;
   std::vector<Eigen::Index> of_obstacles_;  // Coordinates of obstacles.
   std::mt19937_64 random_;
   std::optional<AvoidanceTrajectory> found_, pursued_;

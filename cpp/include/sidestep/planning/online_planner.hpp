@@ -18,6 +18,7 @@
 
 namespace sidestep {
 
+/// @cond internal
 /// Status of a motion that an OnlinePlanner leads.
 enum class OnlinePlannerStatus {
   idle,                ///< No goal was given.
@@ -32,6 +33,7 @@ enum class OnlinePlannerStatus {
 
 /// Short names, for example "goal_in_collision".
 const char* name(OnlinePlannerStatus status) noexcept;
+/// @endcond
 
 /// Leads an arm to a goal along a path that is searched in the background, by a reference that runs ahead on the path.
 ///

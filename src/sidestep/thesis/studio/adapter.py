@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, MotionProgram, Obstacles, Step, TorqueSolution
+from sidestep._core import GeometricSystem, MotionProgram, MotionSolution, Obstacles, Step
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
@@ -31,7 +31,7 @@ class SystemAdapter:
         self.system = system
         self._robot, self._program, self._tip = robot, program, tip
         self._step: Step | None = None
-        self._solution: TorqueSolution | None = None
+        self._solution: MotionSolution | None = None
 
     def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
         """The same; thorough: the posture is looked for from everywhere, not only from q."""
