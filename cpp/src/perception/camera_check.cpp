@@ -14,9 +14,11 @@ namespace sidestep {
 namespace {
 
 constexpr int points_of_image = 2000;      // Points of an image that are kept, about.
-constexpr int rounds = 30;                 // Gauss-Newton steps.
+constexpr int rounds = 60;                 // Gauss-Newton steps.
 constexpr double first_reach = 0.12;       // Distance from the arm up to which points count, in the first round [m].
 constexpr double last_reach = 0.02;        // The same, in the last rounds [m].
+constexpr double reach_share = 0.95;       // By which this gets less from round to round.
+constexpr double told_weight = 0.003;      // Weight of the pose that was told, per point [m²/rad² | 1].
 constexpr double time_step = 0.005;        // Time between two states whose difference is a velocity [s].
 constexpr double longest_offset = 0.3;     // Largest clock offset that is looked for [s].
 constexpr double least_speed = 0.02;       // Mean speed of what is seen of the arm, below which it says nothing of a clock [m/s].
@@ -35,7 +37,7 @@ Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {
 
 /// The sums of one fit over some of the images.
 struct CameraCheck::Fit {
-  /// An ellipsoid of a link that moves, ready for distances.
+  /// An ellipsoid, ready for distances.
   struct Surface {
     BodyEllipsoid ellipsoid;
     Eigen::Matrix3d inverse;
@@ -76,9 +78,6 @@ CameraCheck::Fit::Fit(const CameraCheck& of)
       X(of.camera_.pose) {
   const Arm& arm = of.arm_;
   for (const BodyEllipsoid& ellipsoid : body_ellipsoids(arm.robot(), arm.body(), "camera check")) {
-    if (ellipsoid.joint < 0) {
-      continue;
-    }
     const std::string& link = arm.body().links[static_cast<std::size_t>(ellipsoid.component)];
     double overshoot = 0.0;
     for (const CoverProof& proof : arm.proof()) {
@@ -121,7 +120,7 @@ void CameraCheck::Fit::add(const Image& image, double reach) {
   for (Eigen::Index n = 0; n < image.points.cols(); ++n) {
     const Eigen::Vector3d p = image.points.col(n), x = X_WC * p;
     const Hit hit = nearest(x, reach);
-    if (!(std::abs(hit.distance) < reach)) {
+    if (!(std::abs(hit.distance) < reach) || hit.normal.dot(x - X_WC.translation()) > 0.0) {  // too far, or near a side that is not seen
       continue;
     }
     const int joint = hit.surface->ellipsoid.joint;
@@ -156,8 +155,12 @@ bool CameraCheck::Fit::step(int first, int stride, double reach, bool with_clock
     g[num_unknowns - 1] = 0.0;
     H(num_unknowns - 1, num_unknowns - 1) = 1.0;
   }
-  H.diagonal() *= 1.0 + 1e-3;
-  H.diagonal().array() += 1e-6 * weights;
+  // What the images do not say stays as it was told.
+  const Eigen::Isometry3d away = check.camera_.pose.inverse() * X;
+  const Eigen::AngleAxisd turned(away.linear());
+  H.diagonal().array() += told_weight * weights;
+  g.head<3>() += told_weight * weights * turned.angle() * turned.axis();
+  g.segment<3>(3) += told_weight * weights * (away.linear().transpose() * away.translation());
   const Unknowns change = -H.ldlt().solve(g);
   Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
   moved.linear() = rotation_by(change.head<3>());
@@ -256,7 +259,7 @@ CameraCorrection CameraCheck::solve() const {
   const auto fitted = [&](int first, int stride) {
     Fit fit(near);
     for (int round = 0; round < rounds; ++round) {
-      const double reach = std::max(last_reach, first_reach * std::pow(0.8, round));
+      const double reach = std::max(last_reach, first_reach * std::pow(reach_share, round));
       if (!fit.step(first, stride, reach, true)) {
         throw std::runtime_error("camera check: too few points of the images are near the arm; check pose, unit of depth and joint states");
       }

@@ -29,7 +29,7 @@ struct CameraCorrection {
 ///
 /// Minimises the robust sum of the distances |d(X_WC p, q(t + τ)) + o| of points p of the images from the surface of the arm over the pose
 /// X_WC and the clock offset τ, by Gauss-Newton steps; d is the first-order distance to the covering ellipsoids, o the mean overshoot of the
-/// link's cover. Points of other things near the arm are outliers. What never moves, as the base, is left out.
+/// link's cover. Points of other things near the arm are outliers. What the images do not say stays as it was told.
 class CameraCheck {
  public:
   /// Throws std::invalid_argument that names the camera, the value and what is allowed.
