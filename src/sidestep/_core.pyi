@@ -4015,6 +4015,90 @@ class PerceptionReport:
     def total_time(self) -> float:
         """Sum of the times [s]."""
 
+class CameraCorrection:
+    """
+    Where a camera is and how its clock goes, as the arm in its images says.
+    """
+
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Pose (4, 4) in the world, or on its link, that fits best."""
+
+    @property
+    def translation(self) -> float:
+        """By which it differs from what was told [m]."""
+
+    @property
+    def rotation(self) -> float:
+        """The same [rad]."""
+
+    @property
+    def clock_offset(self) -> float:
+        """
+        To add to the times of images [s]; nan: not known, the arm does not move enough.
+        """
+
+    @property
+    def rms_before(self) -> float:
+        """Distance of points from the surface of the arm before [m], robust."""
+
+    @property
+    def rms_after(self) -> float:
+        """The same afterwards [m]."""
+
+    @property
+    def overshoot(self) -> float:
+        """
+        By which the cover is larger than the arm, where it was seen [m]: taken off.
+        """
+
+    @property
+    def translation_spread(self) -> float:
+        """Half the difference of what each second image alone says [m]."""
+
+    @property
+    def rotation_spread(self) -> float:
+        """The same [rad]."""
+
+    @property
+    def clock_spread(self) -> float:
+        """The same of the clock offset [s]."""
+
+    @property
+    def images(self) -> int:
+        """Number of images that show the arm."""
+
+    @property
+    def points(self) -> int:
+        """Number of points near it."""
+
+    @property
+    def question(self) -> str:
+        """What is hard to believe, in words; empty: nothing."""
+
+class CameraCheck:
+    """
+    Measures pose and clock offset of a camera from the arm that moves in view.
+
+    Minimises the robust sum of the distances |d(X_WC p, q(t + tau)) + o| of points p of the images from the surface of the arm
+    over the pose X_WC and the clock offset tau; d is the distance to the covering ellipsoids, o the overshoot of the link's cover.
+    """
+
+    def __init__(self, arm: Arm, camera: DepthCamera) -> None: ...
+
+    def add_state(self, q: numpy.typing.ArrayLike, *, time: float) -> None:
+        """The arm was at q (nv,) at a time [s], later than the last one."""
+
+    def add(self, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None) -> None:
+        """
+        An image (height, width), captured at a time [s]; as for Perception.update.
+        """
+
+    def solve(self) -> CameraCorrection:
+        """
+        Raises RuntimeError where fewer than three images show the arm near where it should be.
+        """
+
 class PerceptionSettings:
     """
     How what cameras see becomes obstacles.

@@ -228,7 +228,7 @@ void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOpti
   entry.set.time = entry.set.heard = options.time;
   entry.set.emptied = entry.set.repeated = false;
   entry.set.valid_for = entry.set.moves_for = validity(entry, options);
-  if (!std::isnan(time) && !std::isinf(options.valid_for)) {
+  if (!std::isnan(time) && !std::isinf(options.valid_for) && options.finds_velocities) {
     find_velocities(entry, before, last, time, !std::isnan(options.time));
   }
 }

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "../math/kernels/in_use.hpp"
+#include "kernels/image_kernel.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -106,29 +109,18 @@ void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const Eige
 }
 
 void ArmMask::mark(const Seen& seen, const DepthCamera& camera, const CameraRays& rays, DepthImage& image) noexcept {
-  const auto constant = noise_of_depth * static_cast<float>(camera.noise.constant);
-  const auto quadratic = noise_of_depth * static_cast<float>(camera.noise.quadratic);
-  const Seen s = seen;
-  const bool hides = !seen.holds_camera;
-  for (int v = s.window.v0; v < s.window.v1; ++v) {
-    const auto row = static_cast<std::ptrdiff_t>(v) * image.width();
-    const float* __restrict__ const x = rays.x() + row;
-    const float* __restrict__ const y = rays.y() + row;
-    const float* __restrict__ const z = image.depth() + row;
-    float* __restrict__ const front = front_.data() + row;
-    float* __restrict__ const arm = arm_.data() + row;
-    for (int u = s.window.u0; u < s.window.u1; ++u) {
-      const float a = x[u] * (s.a[0] * x[u] + s.a[2] * y[u] + s.a[3]) + y[u] * (s.a[1] * y[u] + s.a[4]) + s.a[5];
-      const float b = s.b[0] * x[u] + s.b[1] * y[u] + s.b[2];
-      const float square = b * b - a * s.gamma;
-      const float root = std::sqrt(std::max(square, 0.0f));
-      const float inverse = 1.0f / a;
-      const float first = (b - root) * inverse, last = (b + root) * inverse;
-      const float noise = constant + quadratic * z[u] * z[u];
-      const bool hit = square >= 0.0f && last > 0.0f;
-      front[u] = hit && hides && first < front[u] ? first : front[u];
-      arm[u] = hit && z[u] > 0.0f && z[u] >= first - noise && z[u] <= last + noise ? 1.0f : arm[u];
-    }
+  const kernels::ImageKernel kernel = SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)();
+  kernels::RayEllipsoid ellipsoid;
+  std::copy(seen.a, seen.a + 6, ellipsoid.a);
+  std::copy(seen.b, seen.b + 3, ellipsoid.b);
+  ellipsoid.gamma = seen.gamma;
+  ellipsoid.constant = noise_of_depth * static_cast<float>(camera.noise.constant);
+  ellipsoid.quadratic = noise_of_depth * static_cast<float>(camera.noise.quadratic);
+  ellipsoid.hides = !seen.holds_camera;
+  for (int v = seen.window.v0; v < seen.window.v1; ++v) {
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(v) * image.width() + seen.window.u0;
+    kernel.mark(ellipsoid, rays.x() + first, rays.y() + first, image.depth() + first, seen.window.u1 - seen.window.u0,
+                front_.data() + first, arm_.data() + first);
   }
 }
 

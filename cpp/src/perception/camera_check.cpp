@@ -13,18 +13,18 @@
 namespace sidestep {
 namespace {
 
-constexpr int points_of_image = 2000;      // Points of an image that are kept, about.
-constexpr int rounds = 60;                 // Gauss-Newton steps.
-constexpr double first_reach = 0.12;       // Distance from the arm up to which points count, in the first round [m].
-constexpr double last_reach = 0.02;        // The same, in the last rounds [m].
-constexpr double reach_share = 0.95;       // By which this gets less from round to round.
-constexpr double told_weight = 0.003;      // Weight of the pose that was told, per point [m²/rad² | 1].
-constexpr double time_step = 0.005;        // Time between two states whose difference is a velocity [s].
-constexpr double longest_offset = 0.3;     // Largest clock offset that is looked for [s].
-constexpr double least_speed = 0.02;       // Mean speed of what is seen of the arm, below which it says nothing of a clock [m/s].
+constexpr int points_of_image = 2000;   // Points of an image that are kept, about.
+constexpr int rounds = 60;              // Gauss-Newton steps.
+constexpr double first_reach = 0.12;    // Distance from the arm up to which points count, in the first round [m].
+constexpr double last_reach = 0.02;     // The same, in the last rounds [m].
+constexpr double reach_share = 0.95;    // By which this gets less from round to round.
+constexpr double told_weight = 0.003;   // Weight of the pose that was told, per point [m²/rad² | 1].
+constexpr double time_step = 0.005;     // Time between two states whose difference is a velocity [s].
+constexpr double longest_offset = 0.3;  // Largest clock offset that is looked for [s].
+constexpr double least_speed = 0.02;    // Mean speed of what is seen of the arm, below which it says nothing of a clock [m/s].
 constexpr int least_images = 3;
-constexpr double least_points = 200.0;     // Sum of the weights of points, below which they say nothing.
-constexpr int num_unknowns = 7;            // Rotation and translation in the optical frame, and the clock offset.
+constexpr double least_points = 200.0;  // Sum of the weights of points, below which they say nothing.
+constexpr int num_unknowns = 7;         // Rotation and translation in the optical frame, and the clock offset.
 
 using Unknowns = Eigen::Matrix<double, num_unknowns, 1>;
 
@@ -57,7 +57,9 @@ struct CameraCheck::Fit {
   void add(const Image& image, double reach);
   /// One round; false where nothing can be said.
   bool step(int first, int stride, double reach, bool with_clock);
-  Eigen::Isometry3d X_WC_at() const { return on_link < 0 ? X : Eigen::Isometry3d(frame_pose(check.arm_.robot(), now, on_link) * X); }
+  Eigen::Isometry3d X_WC_at() const {
+    return on_link < 0 ? X : Eigen::Isometry3d(frame_pose(check.arm_.robot(), now, on_link) * X);
+  }
 
   const CameraCheck& check;
   std::vector<Surface> surfaces;
@@ -120,7 +122,8 @@ void CameraCheck::Fit::add(const Image& image, double reach) {
   for (Eigen::Index n = 0; n < image.points.cols(); ++n) {
     const Eigen::Vector3d p = image.points.col(n), x = X_WC * p;
     const Hit hit = nearest(x, reach);
-    if (!(std::abs(hit.distance) < reach) || hit.normal.dot(x - X_WC.translation()) > 0.0) {  // too far, or near a side that is not seen
+    if (!(std::abs(hit.distance) < reach) ||
+        hit.normal.dot(x - X_WC.translation()) > 0.0) {  // too far, or near a side that is not seen
       continue;
     }
     const int joint = hit.surface->ellipsoid.joint;
@@ -170,7 +173,8 @@ bool CameraCheck::Fit::step(int first, int stride, double reach, bool with_clock
   return true;
 }
 
-CameraCheck::CameraCheck(const Arm& arm, const DepthCamera& camera) : arm_(arm), camera_(camera), rays_(camera), image_(camera) {
+CameraCheck::CameraCheck(const Arm& arm, const DepthCamera& camera)
+    : arm_(arm), camera_(camera), rays_(camera), image_(camera) {
   camera_.validate();
   if (!camera_.link.empty()) {
     arm_.robot().frame_index(camera_.link);  // throws
@@ -179,11 +183,12 @@ CameraCheck::CameraCheck(const Arm& arm, const DepthCamera& camera) : arm_(arm),
 
 void CameraCheck::add_state(double time, const Eigen::VectorXd& q) {
   if (q.size() != arm_.num_coordinates() || !q.allFinite()) {
-    throw std::invalid_argument("camera check: q has " + std::to_string(q.size()) + " entries, allowed: " +
-                                std::to_string(arm_.num_coordinates()) + ", all finite");
+    throw std::invalid_argument("camera check: q has " + std::to_string(q.size()) +
+                                " entries, allowed: " + std::to_string(arm_.num_coordinates()) + ", all finite");
   }
   if (!std::isfinite(time) || (!times_.empty() && time <= times_.back())) {
-    throw std::invalid_argument("camera check: a state is of " + std::to_string(time) + " s, allowed: later than the one before");
+    throw std::invalid_argument("camera check: a state is of " + std::to_string(time) +
+                                " s, allowed: later than the one before");
   }
   times_.push_back(time);
   states_.push_back(q);
@@ -191,7 +196,8 @@ void CameraCheck::add_state(double time, const Eigen::VectorXd& q) {
 
 void CameraCheck::add(const RawDepth& depth, double time) {
   if (!std::isfinite(time)) {
-    throw std::invalid_argument("camera check: time of an image is " + std::to_string(time) + ", allowed: seconds on the clock of the states");
+    throw std::invalid_argument("camera check: time of an image is " + std::to_string(time) +
+                                ", allowed: seconds on the clock of the states");
   }
   image_.take(camera_, depth);
   std::vector<std::size_t> chosen;
@@ -207,7 +213,8 @@ void CameraCheck::add(const RawDepth& depth, double time) {
   for (std::size_t n = 0, k = 0; n < chosen.size(); n += every, ++k) {
     const std::size_t i = chosen[n];
     const double z = static_cast<double>(image_.depth()[i]);
-    image.points.col(static_cast<Eigen::Index>(k)) << static_cast<double>(rays_.x()[i]) * z, static_cast<double>(rays_.y()[i]) * z, z;
+    image.points.col(static_cast<Eigen::Index>(k)) << static_cast<double>(rays_.x()[i]) * z,
+        static_cast<double>(rays_.y()[i]) * z, z;
   }
   images_.push_back(std::move(image));
 }
@@ -253,15 +260,17 @@ CameraCorrection CameraCheck::solve() const {
     result.points += static_cast<int>(image.points.cols());
   }
   if (result.images < least_images) {
-    throw std::runtime_error("camera check: " + std::to_string(result.images) +
-                             " images show the arm within 12 cm of where it should be, at least 3 are needed; check pose, unit of depth and joint states");
+    throw std::runtime_error(
+        "camera check: " + std::to_string(result.images) +
+        " images show the arm within 12 cm of where it should be, at least 3 are needed; check pose, unit of depth and joint states");
   }
   const auto fitted = [&](int first, int stride) {
     Fit fit(near);
     for (int round = 0; round < rounds; ++round) {
       const double reach = std::max(last_reach, first_reach * std::pow(reach_share, round));
       if (!fit.step(first, stride, reach, true)) {
-        throw std::runtime_error("camera check: too few points of the images are near the arm; check pose, unit of depth and joint states");
+        throw std::runtime_error(
+            "camera check: too few points of the images are near the arm; check pose, unit of depth and joint states");
       }
     }
     return fit;
@@ -286,9 +295,11 @@ CameraCorrection CameraCheck::solve() const {
     result.clock_spread = 0.5 * std::abs(even.offset - odd.offset);
   }
   if (!moves) {
-    result.question = "the arm hardly moves in these images, so they say nothing of the clock; and a pose of one posture may be wrong elsewhere";
+    result.question =
+        "the arm hardly moves in these images, so they say nothing of the clock; and a pose of one posture may be wrong elsewhere";
   } else if (std::abs(all.offset) >= longest_offset) {
-    result.question = "the clock offset is at least 0.3 s: images and states are not of the same motion, or of different clocks";
+    result.question =
+        "the clock offset is at least 0.3 s: images and states are not of the same motion, or of different clocks";
   } else if (result.rms_after > 0.015) {
     result.question = "points are far from the arm even so: the arm in view is another one, or something hides it";
   }

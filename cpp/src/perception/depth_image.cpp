@@ -5,6 +5,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "../math/kernels/in_use.hpp"
+#include "kernels/image_kernel.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -36,13 +39,6 @@ void convert(const std::uint16_t* raw, float unit, float low, std::size_t size, 
   }
 }
 
-/// Adds to `support` where a neighbour is on the same surface.
-void add_support(const float* z, const float* neighbour, const float* tolerance, int begin, int end, float* support) noexcept {
-  for (int u = begin; u < end; ++u) {
-    support[u] += std::abs(z[u] - neighbour[u]) <= tolerance[u] ? 1.0f : 0.0f;
-  }
-}
-
 }  // namespace
 
 DepthImage::DepthImage(const DepthCamera& camera)
@@ -51,6 +47,7 @@ DepthImage::DepthImage(const DepthCamera& camera)
       depth_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
       tolerance_(static_cast<std::size_t>(camera.width)),
       support_(tolerance_.size()),
+      others_(tolerance_.size()),
       labels_(depth_.size()) {}
 
 void DepthImage::take(const DepthCamera& camera, const RawDepth& raw) {
@@ -86,30 +83,33 @@ void DepthImage::mark_edges(const DepthCamera& camera) noexcept {
   const auto constant = noise_reach * static_cast<float>(camera.noise.constant);
   const auto quadratic = noise_reach * static_cast<float>(camera.noise.quadratic);
   const auto far = static_cast<float>(camera.far);
+  const kernels::ImageKernel kernel = SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)();
   for (int v = 0; v < height_; ++v) {
     const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_);
     const float* const z = depth_.data() + row;
     for (int u = 0; u < width_; ++u) {
       tolerance_[static_cast<std::size_t>(u)] = z[u] > 0.0f ? constant + z[u] * (slope_share + quadratic * z[u]) : -1.0f;
-      support_[static_cast<std::size_t>(u)] = 0.0f;
+      support_[static_cast<std::size_t>(u)] = others_[static_cast<std::size_t>(u)] = 0.0f;
     }
     for (int dv = -1; dv <= 1; ++dv) {
       if (v + dv < 0 || v + dv >= height_) {
         continue;
       }
       const float* const other = z + dv * width_;
-      add_support(z, other - 1, tolerance_.data(), 1, width_, support_.data());
-      add_support(z, other + 1, tolerance_.data(), 0, width_ - 1, support_.data());
+      kernel.compare(z + 1, other, tolerance_.data() + 1, width_ - 1, support_.data() + 1, others_.data() + 1);
+      kernel.compare(z, other + 1, tolerance_.data(), width_ - 1, support_.data(), others_.data());
       if (dv != 0) {
-        add_support(z, other, tolerance_.data(), 0, width_, support_.data());
+        kernel.compare(z, other, tolerance_.data(), width_, support_.data(), others_.data());
       }
     }
     PixelLabel* const label = labels_.data() + row;
     for (int u = 0; u < width_; ++u) {
-      label[u] = !(z[u] > 0.0f)                                          ? PixelLabel::nothing
-                 : z[u] > far                                            ? PixelLabel::outside
-                 : support_[static_cast<std::size_t>(u)] < least_support ? PixelLabel::edge
-                                                                         : PixelLabel::obstacle;
+      const std::size_t i = static_cast<std::size_t>(u);
+      const bool flies = support_[i] < least_support && others_[i] > 0.0f;
+      label[u] = !(z[u] > 0.0f) ? PixelLabel::nothing
+                 : z[u] > far   ? PixelLabel::outside
+                 : flies        ? PixelLabel::edge
+                                : PixelLabel::obstacle;
     }
   }
 }

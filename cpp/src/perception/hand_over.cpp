@@ -1,6 +1,7 @@
 // What the map holds, as obstacles of the controller.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +11,9 @@
 namespace sidestep {
 namespace {
 
+constexpr double ever = std::numeric_limits<double>::infinity();
+constexpr double speed_window = 0.15;    // Time over which a velocity is found, about [s].
+constexpr double speed_noise = 2.0;      // Displacement in that time that may be noise of depths, in standard deviations.
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
@@ -134,10 +138,10 @@ void Perception::Impl::add_unseen(const SeenImage& seen) {
     unseen_time = seen.time;
     border = unseen->border(seen.time);
     const Eigen::Index num = border.cols();
-    controller.set_obstacles(
-        num == 0 ? Obstacles::none()
-                 : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
-        {unseen_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
+    tell(unseen_source,
+         num == 0 ? Obstacles::none()
+                  : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
+         {unseen_source, SourceOptions::untold, ever, false});
   }
 }
 
@@ -178,39 +182,78 @@ bool Perception::Impl::is_left_out(const Voxel& voxel) const {
   return false;
 }
 
+void Perception::Impl::tell(const std::string& source, Obstacles obstacles, const SourceOptions& options) {
+  const std::shared_ptr<const Obstacles> before = controller.obstacles_of(source);
+  if (obstacles.size() == 0 && before != nullptr && before->size() > 0) {
+    controller.remove_obstacles(source);  // nothing is there, as images show: no need to wait for more
+  }
+  controller.set_obstacles(std::move(obstacles), options);
+}
+
+Obstacles Perception::Impl::moving_balls(View& view, double time) {
+  const std::vector<Voxel>& voxels = map.voxels();
+  if (shown.empty()) {
+    view.motion.forget();
+    return Obstacles::none();
+  }
+  const auto num = static_cast<Eigen::Index>(shown.size());
+  Eigen::Matrix3Xd points(3, num);
+  Eigen::VectorXd radii(num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    // The middle of what this image shows moves with it; the ball around it holds what images before have shown, too.
+    const Voxel& voxel = voxels[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])];
+    const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
+    points.col(n) = middle;
+    radii[n] = (middle - low_of(voxel)).cwiseMax(high_of(voxel) - middle).norm() + static_cast<double>(voxel.error);
+  }
+  Obstacles balls(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+  VelocityEstimate::Result found = view.motion.update(balls, time);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const double depth = (balls.points().col(n) - view.X_WC.translation()).norm();
+    const double speed = found.velocities.col(n).norm();
+    if (speed > 0.0 && speed * speed_window < speed_noise * view.camera.noise.sigma(depth)) {
+      found.velocities.col(n).setZero();
+      found.uncertainty[n] = std::max(found.uncertainty[n], speed);
+    }
+  }
+  return balls.moving(std::move(found.velocities), std::move(found.uncertainty));
+}
+
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
   const std::shared_ptr<const Obstacles> told = controller.obstacles_of(SourceOptions::scene);
   const std::vector<Voxel>& voxels = map.voxels();
   tested.resize(voxels.size());
   is_excluded.resize(voxels.size());
-  std::vector<int> shown, remembered;
-  for (std::size_t n = 0; n < voxels.size(); ++n) {
-    const Voxel& voxel = voxels[n];
-    if (voxel.cell < 0 || !voxel.counts || map.is_background(voxel)) {
+  shown.clear();
+  remembered.clear();
+  for (const int index : map.touched()) {
+    const auto n = static_cast<std::size_t>(index);
+    if (!voxels[n].counts || map.is_background(voxels[n])) {
       continue;
     }
-    const bool is_current = is_shown(voxel);
-    if (is_current && voxel.camera == number) {
-      is_excluded[n] = is_explained(n, told.get()) || is_left_out(voxel) ? 1 : 0;
+    is_excluded[n] = is_explained(n, told.get()) || is_left_out(voxels[n]) ? 1 : 0;
+    if (is_excluded[n] == 0) {
+      shown.push_back(index);
     }
-    if (is_excluded[n] != 0) {
-      ++report.explained;
-    } else if (!is_current) {
+  }
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    const Voxel& voxel = voxels[n];
+    if (voxel.cell < 0 || !voxel.counts) {
+      continue;
+    }
+    report.explained += is_excluded[n] != 0 ? 1 : 0;
+    if (is_excluded[n] == 0 && voxel.shown_by == 0 && !map.is_background(voxel)) {
       remembered.push_back(static_cast<int>(n));
-    } else if (voxel.camera == number) {
-      shown.push_back(static_cast<int>(n));
     }
+  }
+  if (remembered != last_remembered) {  // boxes of what is not seen do not change
+    tell(memory_source, balls(voxels, remembered), {memory_source, SourceOptions::untold, ever, false});
+    last_remembered.swap(remembered);
   }
   View& view = views[number];
-  controller.set_obstacles(balls(voxels, remembered),
-                           {memory_source, SourceOptions::untold, std::numeric_limits<double>::infinity()});
-  if (shown.empty() && std::exchange(view.had_obstacles, false)) {
-    controller.remove_obstacles(view.camera.name);  // the image shows that there is nothing: no need to wait for more
-  }
-  view.had_obstacles = view.had_obstacles || !shown.empty();
-  controller.set_obstacles(balls(voxels, shown), {view.camera.name, time, settings.valid_for});
+  tell(view.camera.name, moving_balls(view, time), {view.camera.name, time, settings.valid_for, false});
   report.seen = static_cast<int>(shown.size());
-  report.remembered = static_cast<int>(remembered.size());
+  report.remembered = static_cast<int>(last_remembered.size());
   report.unseen = static_cast<int>(border.cols());
 }
 
@@ -232,7 +275,8 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
   for (std::size_t n = 0; n < is_excluded.size(); ++n) {
     const Voxel& voxel = map.voxels()[n];
     if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0) {
-      all.push_back({centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, !is_shown(voxel), voxel.is_hidden});
+      all.push_back(
+          {centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, voxel.shown_by == 0, voxel.is_hidden});
     }
   }
   return all;

@@ -8,6 +8,7 @@
 
 #include "sidestep/perception/perception.hpp"
 #include "sidestep/perception/unseen_space.hpp"
+#include "sidestep/scene/velocity_estimate.hpp"
 
 namespace sidestep {
 
@@ -27,8 +28,7 @@ struct Perception::Impl {
     double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
-    std::uint32_t frame = 0;                                   // Number of the last image in the map.
-    bool had_obstacles = false;
+    VelocityEstimate motion;  // of what the camera shows
   };
   struct Region {
     std::string name;
@@ -57,9 +57,12 @@ struct Perception::Impl {
   void judge(View& view, PerceptionReport& report) const;
   /// Gives the controller what the camera shows, and what no camera shows now.
   void hand_over(std::size_t number, double time, PerceptionReport& report);
+  /// Replaces what a source says. Without obstacles that is believed at once: it comes from images that show something.
+  void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
+  /// What a camera shows, with velocities.
+  Obstacles moving_balls(View& view, double time);
   bool is_explained(std::size_t voxel, const Obstacles* told);
   bool is_left_out(const Voxel& voxel) const;
-  bool is_shown(const Voxel& voxel) const noexcept { return voxel.frame == views[voxel.camera].frame; }
   bool drop_region(const std::string& name);
   std::vector<Cell> cells() const;
   std::vector<PixelLabel> labels(const View& view) const;
@@ -77,6 +80,8 @@ struct Perception::Impl {
   Eigen::Matrix3Xd border{3, 0};
   std::vector<Region> regions;
   std::vector<Tested> tested;     // one per voxel
+  std::vector<int> shown, remembered;  // Voxels that a camera shows, and that none shows, in work.
+  std::vector<int> last_remembered;    // The latter, as the controller has them.
   std::vector<char> is_excluded;  // Per voxel: explained or left out.
 };
 

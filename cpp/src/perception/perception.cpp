@@ -102,7 +102,6 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   report.unseen_time = since(mark);
   view.X_WC = X_WC;
   view.time = time;
-  view.frame = map.frame();
   judge(view, report);
   hand_over(number, time, report);
   report.obstacles_time = since(mark);

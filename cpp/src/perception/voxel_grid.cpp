@@ -1,7 +1,11 @@
 #include "sidestep/perception/voxel_grid.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
+
+#include "../math/kernels/in_use.hpp"
+#include "kernels/image_kernel.hpp"
 
 namespace sidestep {
 namespace {
@@ -29,21 +33,11 @@ VoxelGrid::VoxelGrid(const Eigen::Vector3d& centre, double fine, double far, dou
 }
 
 void VoxelGrid::cells(const float* x, const float* y, const float* z, int count, int* cells) const noexcept {
-  const float cx = centre_[0], cy = centre_[1], cz = centre_[2];
-  for (int n = 0; n < count; ++n) {
-    cells[n] = -1;
-  }
+  const kernels::ImageKernel kernel = SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)();
+  std::fill(cells, cells + count, -1);
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {  // finer levels overwrite coarser ones
-    const float half = level->half, per_metre = level->per_metre;
-    const int side = level->side, begin = level->begin;
-    for (int n = 0; n < count; ++n) {
-      const float a = x[n] - cx, b = y[n] - cy, c = z[n] - cz;
-      const bool inside = std::fabs(a) < half && std::fabs(b) < half && std::fabs(c) < half;
-      const float i = inside ? (a + half) * per_metre : 0.0f, j = inside ? (b + half) * per_metre : 0.0f,
-                  k = inside ? (c + half) * per_metre : 0.0f;
-      const int cell = begin + (static_cast<int>(k) * side + static_cast<int>(j)) * side + static_cast<int>(i);
-      cells[n] = inside ? cell : cells[n];
-    }
+    kernel.cells({{centre_[0], centre_[1], centre_[2]}, level->half, level->per_metre, level->side, level->begin}, x, y, z,
+                 count, cells);
   }
 }
 

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "../math/kernels/in_use.hpp"
+#include "kernels/image_kernel.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -12,9 +15,13 @@ constexpr double kept_at_least = 0.3;     // The same, at least [s].
 constexpr float shrinks_by = 0.2f;        // Share of its excess by which a box shrinks from one image to the next.
 constexpr double second_within = 0.5;     // Time within which a second image must show a voxel with few pixels [s].
 constexpr double noise_beyond = 3.0;      // Noise of a depth that is behind a cell, in standard deviations.
+constexpr int missed_at_most = 5;         // Images that see the surface nearby, and not in the cell, after which it was noise.
+constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
 constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
+
+constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
 
 }  // namespace
 
@@ -81,60 +88,60 @@ void VoxelMap::begin_frame(Voxel& voxel, const SeenImage& seen) noexcept {
 }
 
 void VoxelMap::add_points(const SeenImage& seen) {
-  const Eigen::Matrix3f R = seen.X_WC.linear().cast<float>();
-  const Eigen::Vector3f t = seen.X_WC.translation().cast<float>();
+  const kernels::ImageKernel kernel = SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)();
+  kernels::Placement X_WC;
+  Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X_WC.R) = seen.X_WC.linear().cast<float>();
+  Eigen::Map<Eigen::Vector3f>(X_WC.t) = seen.X_WC.translation().cast<float>();
   const int width = seen.image.width();
   num_outside_ = 0;
   for (int v = 0; v < seen.image.height(); ++v) {
     const auto row = static_cast<std::ptrdiff_t>(v) * width;
-    const float* __restrict__ const ray_x = seen.rays.x() + row;
-    const float* __restrict__ const ray_y = seen.rays.y() + row;
-    const float* __restrict__ const depth = seen.image.depth() + row;
-    float* __restrict__ const x = row_x_.data();
-    float* __restrict__ const y = row_y_.data();
-    float* __restrict__ const z = row_z_.data();
-    for (int u = 0; u < width; ++u) {
-      const float a = ray_x[u] * depth[u], b = ray_y[u] * depth[u], c = depth[u];
-      x[u] = R(0, 0) * a + R(0, 1) * b + R(0, 2) * c + t[0];
-      y[u] = R(1, 0) * a + R(1, 1) * b + R(1, 2) * c + t[1];
-      z[u] = R(2, 0) * a + R(2, 1) * b + R(2, 2) * c + t[2];
-    }
-    grid_.cells(x, y, z, width, row_cells_.data());
+    kernel.place(X_WC, seen.rays.x() + row, seen.rays.y() + row, seen.image.depth() + row, width, row_x_.data(), row_y_.data(),
+                 row_z_.data());
+    grid_.cells(row_x_.data(), row_y_.data(), row_z_.data(), width, row_cells_.data());
     add_row(seen, seen.image.labels() + row);
   }
 }
 
 void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
-  int last_cell = -1;
-  Voxel* voxel = nullptr;
-  for (std::size_t u = 0; u < row_cells_.size(); ++u) {
-    const int cell = row_cells_[u];
-    if (labels[u] != PixelLabel::obstacle) {
+  const float *const x = row_x_.data(), *const y = row_y_.data(), *const z = row_z_.data();
+  const int* const cells = row_cells_.data();
+  const std::size_t width = row_cells_.size();
+  for (std::size_t u = 0; u < width;) {
+    const int cell = cells[u];
+    if (labels[u] != PixelLabel::obstacle || cell < 0) {
+      num_outside_ += labels[u] == PixelLabel::obstacle ? 1 : 0;
+      ++u;
       continue;
     }
-    if (cell < 0) {
-      ++num_outside_;
-      continue;
+    // Pixels side by side that are in one cell are taken together.
+    const std::size_t first = u;
+    float low_x = x[u], high_x = x[u], low_y = y[u], high_y = y[u], low_z = z[u], high_z = z[u];
+    for (++u; u < width && cells[u] == cell && labels[u] == PixelLabel::obstacle; ++u) {
+      low_x = std::min(low_x, x[u]);
+      high_x = std::max(high_x, x[u]);
+      low_y = std::min(low_y, y[u]);
+      high_y = std::max(high_y, y[u]);
+      low_z = std::min(low_z, z[u]);
+      high_z = std::max(high_z, z[u]);
     }
-    if (cell != last_cell) {
-      last_cell = cell;
-      voxel = &voxel_at(cell, seen.time);
-      if (voxel->frame != frame_) {
-        begin_frame(*voxel, seen);
-      }
+    Voxel& voxel = voxel_at(cell, seen.time);
+    if (voxel.frame != frame_) {
+      begin_frame(voxel, seen);
     }
-    ++voxel->pixels;
-    const float p[3] = {row_x_[u], row_y_[u], row_z_[u]};
-    for (int axis = 0; axis < 3; ++axis) {
-      voxel->frame_low[axis] = std::min(voxel->frame_low[axis], p[axis]);
-      voxel->frame_high[axis] = std::max(voxel->frame_high[axis], p[axis]);
-    }
+    voxel.pixels += static_cast<int>(u - first);
+    voxel.frame_low[0] = std::min(voxel.frame_low[0], low_x);
+    voxel.frame_low[1] = std::min(voxel.frame_low[1], low_y);
+    voxel.frame_low[2] = std::min(voxel.frame_low[2], low_z);
+    voxel.frame_high[0] = std::max(voxel.frame_high[0], high_x);
+    voxel.frame_high[1] = std::max(voxel.frame_high[1], high_y);
+    voxel.frame_high[2] = std::max(voxel.frame_high[2], high_z);
   }
 }
 
 void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   const bool is_new = voxel.pixels > 0 && !(voxel.high[0] > voxel.low[0]) && !voxel.counts;
-  const bool shown_again = voxel.first < seen.time && seen.time - voxel.last <= second_within;
+  const bool shown_again = voxel.first < seen.time && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
   for (int axis = 0; axis < 3; ++axis) {
     if (is_new || !(seen.time > voxel.last)) {
       voxel.low[axis] = voxel.frame_low[axis];
@@ -146,12 +153,16 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
           std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks_by * (voxel.frame_high[axis] - voxel.high[axis]));
     }
   }
-  voxel.counts = voxel.counts || voxel.pixels >= settings_.least_pixels || shown_again;
   const Eigen::Vector3d middle(voxel.low[0], voxel.low[1], voxel.low[2]);
+  const double pixel = (middle - seen.X_WC.translation()).norm() / std::min(seen.camera.fx, seen.camera.fy);
+  const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
+  voxel.counts =
+      voxel.counts || voxel.pixels >= std::max<double>(settings_.least_pixels, least_share * all_pixels) || shown_again;
+  voxel.shown_by |= bit(seen.number);
   voxel.error = static_cast<float>(seen.camera.translation_error +
                                    seen.camera.rotation_error * (middle - seen.X_WC.translation()).norm());
   voxel.last = std::max(voxel.last, seen.time);
-  voxel.free_images = 0;
+  voxel.free_images = voxel.missed_images = 0;
   voxel.is_hidden = false;
 }
 
@@ -164,8 +175,8 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
   }
   const Eigen::Vector2d pixel = seen.camera.project(middle);
   const double offset_u = 0.35 * edge * seen.camera.fx / middle.z(), offset_v = 0.35 * edge * seen.camera.fy / middle.z();
-  const double behind = middle.z() + half + noise_beyond * seen.camera.noise.sigma(middle.z());
-  int num_free = 0, num_inside = 0;
+  const double noise = noise_beyond * seen.camera.noise.sigma(middle.z());
+  int num_free = 0, num_inside = 0, num_surface = 0;
   for (int sample = 0; sample < samples_of_cell; ++sample) {
     const double side_u = sample == 0 ? 0.0 : (sample % 2 == 0 ? 1.0 : -1.0),
                  side_v = sample == 0 ? 0.0 : (sample < 3 ? 1.0 : -1.0);
@@ -181,16 +192,22 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
       continue;
     }
     const double sees_to = seen.sees_to(i);
-    if (sees_to > behind) {
+    if (sees_to > middle.z() + half + noise) {
       ++num_free;
-    } else if (sees_to < middle.z() - half) {
+    } else if (sees_to < middle.z() - half - noise) {
       return Sight::hidden;
+    } else {
+      ++num_surface;
     }
   }
-  return num_inside == 0 ? Sight::elsewhere : num_free >= samples_free ? Sight::free : Sight::hidden;
+  return num_inside == 0              ? Sight::elsewhere
+         : num_free >= samples_free   ? Sight::free
+         : num_free + num_surface > 0 ? Sight::surface
+                                      : Sight::hidden;
 }
 
 void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept {
+  voxel.shown_by &= static_cast<std::uint16_t>(~bit(seen.number));
   const Sight what = sight(voxel, seen, X_CW);
   if (what == Sight::free) {
     voxel.is_hidden = false;
@@ -199,9 +216,11 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
     }
     return;
   }
-  if (what == Sight::hidden) {
-    voxel.is_hidden = true;
+  if (what == Sight::surface && ++voxel.missed_images >= (voxel.counts ? missed_at_most : 2)) {
+    remove(voxel);
+    return;
   }
+  voxel.is_hidden = voxel.is_hidden || what == Sight::hidden;
   const double kept = std::min(settings_.memory, kept_at_least + kept_per_seen * (voxel.last - voxel.first));
   if (seen.time - voxel.last > (voxel.counts ? kept : second_within)) {
     remove(voxel);

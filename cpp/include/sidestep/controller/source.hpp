@@ -15,6 +15,7 @@ struct SourceOptions {
   /// Age up to which it is believed [s]; inf: for ever; NaN: SourceSettings::valid_for where it was given a time or has velocities, or
   /// where such sets came three times within that; else ControllerSettings::obstacle_timeout.
   double valid_for = untold;
+  bool finds_velocities = true;  ///< Velocities that are not told are found from set to set, where sets come again and again.
 };
 
 /// What a controller believes of a source.

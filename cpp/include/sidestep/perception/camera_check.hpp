@@ -16,9 +16,10 @@ namespace sidestep {
 struct CameraCorrection {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< X_WC, or X_LC on a link, that fits best
   double translation = 0.0, rotation = 0.0;                ///< by which it differs from what was told [m], [rad]
-  double clock_offset = 0.0;     ///< to add to the times of images [s]: positive where their stamps are early; NaN: not known, the arm does not move enough
+  double clock_offset =
+      0.0;  ///< to add to the times of images [s]: positive where their stamps are early; NaN: not known, the arm does not move enough
   double rms_before = 0.0, rms_after = 0.0;  ///< distance of points from the surface of the arm [m], robust
-  double overshoot = 0.0;        ///< by which the cover is larger than the arm, where it was seen, on average [m]: taken off
+  double overshoot = 0.0;  ///< by which the cover is larger than the arm, where it was seen, on average [m]: taken off
   /// Half the difference of what each second image alone says: how well this repeats.
   double translation_spread = 0.0, rotation_spread = 0.0, clock_spread = 0.0;
   int images = 0, points = 0;

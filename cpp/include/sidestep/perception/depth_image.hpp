@@ -29,8 +29,8 @@ struct RawDepth {
 
 /// An image of depths that were checked, and what its pixels show.
 ///
-/// A pixel is flying where fewer than two of its eight neighbours have its depth but for noise and slope:
-/// |z - z'| <= 4 σ(z) + `slope` z.
+/// A pixel is flying where at least one of its eight neighbours has another depth and fewer than two have its own, but for noise and
+/// slope: |z - z'| <= 4 σ(z) + 0.03 z. One whose neighbours show nothing is none.
 class DepthImage {
  public:
   explicit DepthImage(const DepthCamera& camera);
@@ -52,7 +52,8 @@ class DepthImage {
 
   int width_, height_;
   std::vector<float> depth_;
-  std::vector<float> tolerance_, support_;  // of one row: difference of depths on one surface [m]; neighbours on it
+  // Of one row: difference of depths on one surface [m], number of neighbours on it, and of those on another one.
+  std::vector<float> tolerance_, support_, others_;
   std::vector<PixelLabel> labels_;
 };
 

@@ -23,6 +23,8 @@ struct Voxel {
   int cell;                           ///< In the grid; -1: the voxel is not in use.
   int pixels;                         ///< Number of pixels of that image that showed it.
   std::uint8_t camera;                ///< Camera that showed it last.
+  std::uint16_t shown_by;             ///< Cameras whose last image shows it, as bits.
+  std::uint8_t missed_images;         ///< Images since then that saw a surface there, and nothing in the cell.
   std::uint8_t free_images;           ///< Images in a row that saw through it.
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
@@ -74,8 +76,8 @@ class VoxelMap {
   const VoxelGrid& grid() const noexcept { return grid_; }
   /// Number of points of the last image that were too far away.
   int num_outside() const noexcept { return num_outside_; }
-  /// Number of the last image, from 1 on.
-  std::uint32_t frame() const noexcept { return frame_; }
+  /// Indices of the voxels that the last image showed.
+  const std::vector<int>& touched() const noexcept { return touched_; }
   void clear() noexcept;
 
  private:
@@ -84,8 +86,8 @@ class VoxelMap {
   Voxel& voxel_at(int cell, double time);
   void begin_frame(Voxel& voxel, const SeenImage& seen) noexcept;
   void end_frame(Voxel& voxel, const SeenImage& seen) noexcept;
-  /// What an image says of a cell that it did not show.
-  enum class Sight { elsewhere, hidden, free };
+  /// What an image says of a cell that it did not show; `surface`: its depth is that of the cell, but for noise.
+  enum class Sight { elsewhere, hidden, surface, free };
   Sight sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
   void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
   void remove(Voxel& voxel) noexcept;

@@ -1,0 +1,197 @@
+// The whole path: what a controller gets from images, by source and time.
+#include "sidestep/perception/perception.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/covered_arm.hpp"
+#include "support/depth_scene.hpp"
+#include "support/repeatable_settings.hpp"
+
+using namespace sidestep;
+
+// Not in a namespace without a name: test cases derive from it.
+struct Watched {
+  Arm arm = test::covered_arm(test::arm_limits(4));
+  Controller controller{arm, test::repeatable_settings(ControllerSettings::Output::acceleration)};
+  Eigen::VectorXd q = Eigen::Vector4d(0.3, -0.8, 0.5, 1.1);
+  DepthCamera camera = test::small_camera({2.0, 0.2, 0.9}, {0.0, 0.0, 0.6});
+  PerceptionSettings settings;
+  std::unique_ptr<Perception> perception;
+  test::DepthScene scene;
+  double time = 10.0;
+
+  Watched() {
+    camera.translation_error = 0.01;
+    scene.floor = -0.3;
+    scene.add_sphere({0.2, 0.9, 0.5}, 0.15);
+    scene.add_arm(arm.robot(), arm.body(), q);
+  }
+  void start() { perception = std::make_unique<Perception>(controller, std::vector{camera}, settings); }
+  void step() { controller.step(q, Eigen::VectorXd::Zero(4), time); }
+  PerceptionReport look(const Capture& capture) {
+    const std::vector<float> pixels = scene.image(camera);
+    return perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, capture);
+  }
+  PerceptionReport look() {
+    const PerceptionReport report = look(Capture{time, {}, std::nullopt});
+    time += 0.03;
+    step();
+    return report;
+  }
+  /// Number of points of a source within a distance of a place.
+  int points(const std::string& source, const Eigen::Vector3d& place, double distance) const {
+    const auto set = controller.obstacles_of(source);
+    return set == nullptr ? -1
+                          : static_cast<int>(((set->points().colwise() - place).colwise().norm().array() < distance).count());
+  }
+};
+
+BOOST_FIXTURE_TEST_CASE(an_image_gives_obstacles_without_the_arm, Watched) {
+  start();
+  BOOST_TEST(!look(Capture{time, {}, std::nullopt}).used);
+  BOOST_TEST(controller.obstacles_of("front") == nullptr);
+  step();
+  const PerceptionReport report = look();
+  BOOST_TEST(report.used);
+  BOOST_TEST(report.question == "");
+  BOOST_TEST(report.arm_pixels > 200);
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
+  const auto set = controller.obstacles_of("front");
+  BOOST_REQUIRE(set != nullptr);
+  const KinematicState state = test::state_at(arm.robot(), q);
+  int on_arm = 0;
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(arm.robot(), arm.body(), "test")) {
+    const KinematicState::Link& link = link_or_world(state, ellipsoid.joint);
+    const Eigen::Matrix3d A = ellipsoid.shape.inverse();
+    for (Eigen::Index n = 0; n < set->size(); ++n) {
+      const Eigen::Vector3d y = link.R_WL.transpose() * (set->points().col(n) - link.p_WL) - ellipsoid.mean;
+      on_arm += y.dot(A * y) <= 1.0 ? 1 : 0;
+    }
+  }
+  BOOST_TEST(on_arm == 0);
+  BOOST_TEST(report.seen == set->size());
+}
+
+BOOST_FIXTURE_TEST_CASE(what_the_arm_hides_is_remembered, Watched) {
+  start();
+  step();
+  scene.balls.resize(1);  // the arm is elsewhere in the image
+  const Eigen::VectorXd away = Eigen::Vector4d(0.0, 2.4, 0.0, 0.0);
+  for (int n = 0; n < 30; ++n) {
+    look(Capture{time, away, std::nullopt});
+    time += 0.03;
+  }
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
+  scene.add_sphere({1.0, 0.55, 0.7}, 0.25);  // something comes in front
+  PerceptionReport report;
+  for (int n = 0; n < 10; ++n) {
+    report = look(Capture{time, away, std::nullopt});
+    time += 0.03;
+  }
+  BOOST_TEST(report.remembered > 10);
+  BOOST_TEST(points("memory", {0.2, 0.9, 0.5}, 0.17) > 10);
+}
+
+BOOST_FIXTURE_TEST_CASE(told_shapes_explain_their_points_and_regions_are_left_out, Watched) {
+  start();
+  step();
+  const int floor = points("front", {0.0, 0.0, 0.0}, 100.0);
+  BOOST_TEST(floor == -1);
+  look();
+  look();  // most cells show fewer than three pixels, so that a second image must show them
+  const int all = points("front", {0.0, 0.0, 0.0}, 100.0);
+  controller.set_obstacles(test::ball({0.2, 0.9, 0.5}, 0.15));
+  const PerceptionReport explained = look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == 0);
+  BOOST_TEST(explained.explained > 20);
+  BOOST_TEST(points("front", {0.0, 0.0, 0.0}, 100.0) < all);
+  controller.set_obstacles(Obstacles::none());
+  controller.remove_obstacles("scene");
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
+  perception->leave_out("cup", test::ball({0.2, 0.9, 0.5}, 0.1), 0.08);
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == 0);
+  const std::vector<PixelLabel> labels = perception->labels("front");
+  BOOST_TEST(std::count(labels.begin(), labels.end(), PixelLabel::left_out) > 20);
+  perception->take_in("cup");
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
+  BOOST_CHECK_THROW(perception->take_in("cup"), std::invalid_argument);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_camera_on_a_link_is_where_the_arm_was, Watched) {
+  camera.link = "tip";
+  camera.pose = Eigen::Isometry3d::Identity();
+  camera.pose.translation().x() = 0.08;
+  start();
+  step();
+  const KinematicState state = test::state_at(arm.robot(), q);
+  const Eigen::Isometry3d X_WC = frame_pose(arm.robot(), state, arm.robot().frame_index("tip")) * camera.pose;
+  const std::vector<float> pixels(160 * 120, 0.5f);
+  const PerceptionReport report =
+      perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  BOOST_TEST(report.used);
+  BOOST_TEST((perception->pose("front").matrix() - X_WC.matrix()).norm() < 1e-12);
+  BOOST_TEST(points("front", X_WC * Eigen::Vector3d(0.0, 0.0, 0.5), 0.03) > 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {
+  start();
+  step();
+  const std::vector<float> pixels(160 * 120, 0.0f);
+  const PerceptionReport report =
+      perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  BOOST_TEST(!report.used);
+  BOOST_TEST(report.question.find("sees nothing") != std::string::npos);
+  BOOST_TEST(controller.obstacles_of("front") == nullptr);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_gone_is_gone_for_the_controller, Watched) {
+  start();
+  step();
+  look();
+  scene.balls.erase(scene.balls.begin());
+  look();
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) <= 0);
+  BOOST_TEST(points("memory", {0.2, 0.9, 0.5}, 0.17) <= 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(unseen_space_is_an_obstacle_if_it_is_closed, Watched) {
+  settings.unseen_is_free = false;
+  start();
+  step();
+  const PerceptionReport report = look();
+  BOOST_TEST(report.unseen > 100);
+  BOOST_TEST(points("unseen", {0.0, 0.0, 0.6}, 3.0) == report.unseen);
+  BOOST_TEST(perception->unseen().cols() == report.unseen);
+}
+
+BOOST_FIXTURE_TEST_CASE(wrong_calls_name_what_is_allowed, Watched) {
+  start();
+  const auto message = [](auto&& call) -> std::string {
+    try {
+      call();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  const std::vector<float> pixels(160 * 120, 1.0f);
+  const RawDepth depth{std::span<const float>(pixels), 1.0};
+  BOOST_TEST(message([&] { perception->update("back", depth, Capture{1.0, {}, std::nullopt}); }) ==
+             "perception: there is no camera 'back', there are: 'front'");
+  BOOST_TEST(message([&] { perception->update("front", depth, Capture{1.0, Eigen::VectorXd::Zero(3), std::nullopt}); }) ==
+             "perception: q has 3 entries, allowed: 4, all finite");
+  BOOST_TEST(message([&] { Perception(controller, {}); }) == "perception: there are 0 cameras, allowed: 1 to 16");
+  BOOST_TEST(message([&] { Perception(controller, {camera, camera}); }).find("two cameras have the name 'front'") !=
+             std::string::npos);
+  PerceptionSettings wrong;
+  wrong.voxel = 0.0;
+  BOOST_TEST(message([&] { Perception(controller, {camera}, wrong); }).find("perception: voxel is 0") == 0u);
+}

@@ -1,0 +1,195 @@
+// The map: what is seen stays, what is seen through goes, what is hidden is kept for a while.
+#include "sidestep/perception/voxel_map.hpp"
+
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "sidestep/perception/unseen_space.hpp"
+#include "support/allocations.hpp"
+#include "support/depth_scene.hpp"
+
+using namespace sidestep;
+
+// Not in a namespace without a name: test cases derive from it.
+struct Mapped {
+  DepthCamera camera = test::small_camera({1.5, 0.0, 0.5}, {0.0, 0.0, 0.5});
+  CameraRays rays{camera};
+  DepthImage image{camera};
+  std::vector<float> no_arm = std::vector<float>(160 * 120, std::numeric_limits<float>::infinity());
+  PerceptionSettings settings;
+  VoxelMap map{Eigen::Vector3d::Zero(), 1.0, settings};
+  double time = 1.0;
+  std::vector<float> pixels;
+
+  SeenImage seen() { return {camera, rays, camera.pose, image, no_arm.data(), 0, time}; }
+  void take(const test::DepthScene& scene) {
+    pixels = scene.image(camera);
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+  }
+  void add() {
+    map.add(seen());
+    time += 1.0 / 30.0;
+  }
+  void add(const test::DepthScene& scene) {
+    take(scene);
+    add();
+  }
+  /// Number of voxels that count as obstacles and whose middle is within a distance of a point.
+  int near(const Eigen::Vector3d& point, double distance) const {
+    int num = 0;
+    for (const Voxel& voxel : map.voxels()) {
+      if (voxel.cell >= 0 && voxel.counts) {
+        const Eigen::Vector3d low(voxel.low[0], voxel.low[1], voxel.low[2]), high(voxel.high[0], voxel.high[1], voxel.high[2]);
+        num += (0.5 * (low + high) - point).norm() < distance ? 1 : 0;
+      }
+    }
+    return num;
+  }
+};
+
+namespace {
+
+const Eigen::Vector3d ball_at(0.0, 0.0, 0.5);
+
+test::DepthScene wall() {
+  test::DepthScene scene;
+  scene.add_sphere({-102.0, 0.0, 0.5}, 100.0);  // a wall at x = -2 m
+  return scene;
+}
+test::DepthScene wall_and_ball() {
+  test::DepthScene scene = wall();
+  scene.add_sphere(ball_at, 0.1);
+  return scene;
+}
+
+}  // namespace
+
+BOOST_FIXTURE_TEST_CASE(boxes_hold_all_points_that_were_seen, Mapped) {
+  add(wall_and_ball());
+  BOOST_TEST(near(ball_at, 0.12) > 20);
+  int num = 0, num_missed = 0;
+  for (int i = 0; i < 160 * 120; ++i) {
+    const float z = image.depth()[i];
+    if (z > 1.6f || image.labels()[i] != PixelLabel::obstacle) {
+      continue;
+    }
+    const Eigen::Vector3f p =
+        (camera.pose * (static_cast<double>(z) * Eigen::Vector3d(rays.x()[i], rays.y()[i], 1.0))).cast<float>();
+    const int index = map.voxel_of(p.data());
+    bool is_held = index >= 0;
+    for (int axis = 0; is_held && axis < 3; ++axis) {
+      const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
+      is_held = p[axis] >= voxel.low[axis] - 1e-5f && p[axis] <= voxel.high[axis] + 1e-5f;
+    }
+    ++num;
+    num_missed += is_held ? 0 : 1;
+  }
+  BOOST_TEST(num > 150);
+  BOOST_TEST(num_missed <= 2);  // points on the border of two cells, by rounding
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_seen_through_goes_after_two_images, Mapped) {
+  add(wall_and_ball());
+  add(wall_and_ball());
+  const int before = near(ball_at, 0.12);
+  BOOST_TEST(before > 20);
+  add(wall());
+  BOOST_TEST(near(ball_at, 0.12) == before);
+  add(wall());
+  BOOST_TEST(near(ball_at, 0.12) == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_hidden_is_kept_ten_times_as_long_as_it_was_seen, Mapped) {
+  for (int n = 0; n < 10; ++n) {
+    add(wall_and_ball());  // seen for 0.3 s
+  }
+  const int before = near(ball_at, 0.12);
+  test::DepthScene hides = wall_and_ball();
+  hides.add_sphere({0.9, 0.0, 0.5}, 0.3);
+  for (int n = 0; n < 30 * 3; ++n) {
+    add(hides);
+  }
+  BOOST_TEST(near(ball_at, 0.12) == before);
+  for (int n = 0; n < 15; ++n) {
+    add(hides);
+  }
+  BOOST_TEST(near(ball_at, 0.12) == 0);  // 0.3 s and ten times 0.3 s
+}
+
+BOOST_FIXTURE_TEST_CASE(the_arm_in_front_hides_too, Mapped) {
+  for (int n = 0; n < 3; ++n) {
+    add(wall_and_ball());
+  }
+  const int before = near(ball_at, 0.12);
+  take(wall());
+  std::fill(image.labels(), image.labels() + image.size(), PixelLabel::arm);
+  std::fill(no_arm.begin(), no_arm.end(), 0.5f);
+  add();
+  add();
+  BOOST_TEST(near(ball_at, 0.12) == before);
+  std::fill(no_arm.begin(), no_arm.end(), 2.5f);  // the arm is behind: what is in front of it is free
+  add();
+  add();
+  BOOST_TEST(near(ball_at, 0.12) == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(holes_hide_what_was_there, Mapped) {
+  for (int n = 0; n < 3; ++n) {
+    add(wall_and_ball());
+  }
+  const int before = near(ball_at, 0.12);
+  pixels.assign(pixels.size(), 0.0f);
+  image.take(camera, {std::span<const float>(pixels), 1.0});
+  add();
+  add();
+  BOOST_TEST(near(ball_at, 0.12) == before);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_few_pixels_count_when_a_second_image_shows_them, Mapped) {
+  take(wall());
+  const auto speck = [&] {
+    for (int u = 78; u < 82; ++u) {
+      image.labels()[60 * 160 + u] = u == 79 || u == 80 ? PixelLabel::obstacle : PixelLabel::nothing;
+    }
+    add();
+  };
+  for (int u = 79; u < 81; ++u) {
+    pixels[static_cast<std::size_t>(60 * 160 + u)] = 1.5f;
+  }
+  image.take(camera, {std::span<const float>(pixels), 1.0});
+  speck();
+  BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) == 0);
+  speck();
+  BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) > 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_map_of_the_same_scene_allocates_nothing, Mapped) {
+  const test::DepthScene scene = wall_and_ball();
+  add(scene);
+  add(scene);
+  BOOST_TEST(test::allocations_of([&] { add(); }) == 0u);
+}
+
+BOOST_FIXTURE_TEST_CASE(unseen_space_is_what_no_ray_has_passed, Mapped) {
+  UnseenSpace space(Eigen::Vector3d(0.0, 0.0, 0.5), 0.5, settings);
+  BOOST_TEST(space.seen_share(1.0) == 0.0);
+  take(wall_and_ball());
+  space.add(seen());
+  const double share = space.seen_share(time);
+  BOOST_TEST(share > 0.6);
+  BOOST_TEST(share < 0.97);  // the shadow of the ball
+  int behind = 0, in_front = 0;
+  const Eigen::Matrix3Xd border = space.border(time);
+  for (Eigen::Index n = 0; n < border.cols(); ++n) {
+    const Eigen::Vector3d p = border.col(n);
+    behind += p.x() < -0.1 && std::hypot(p.y(), p.z() - 0.5) < 0.15 ? 1 : 0;
+    in_front += p.x() > 0.15 && std::hypot(p.y(), p.z() - 0.5) < 0.1 ? 1 : 0;
+  }
+  BOOST_TEST(behind > 5);
+  BOOST_TEST(in_front == 0);
+  space.add_arm({-0.25, 0.0, 0.5}, 0.15 * 0.15 * Eigen::Matrix3d::Identity(), time);
+  BOOST_TEST(space.seen_share(time) > share);
+}
