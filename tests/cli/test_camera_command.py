@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,13 +15,10 @@ import pytest
 from PIL import Image
 
 from sidestep import Arm, cli, perception
-from sidestep.perception import open_recording
+from sidestep.perception import Frame, open_recording
 from support.camera_scene import CAMERA, HOLES, START, WIDTH, configurations, write_recording
 
 Invoke = Callable[..., int]
-needs_check = pytest.mark.skipif(
-    not hasattr(perception, "CameraCheck"), reason="the core has no CameraCheck yet"
-)
 
 
 @pytest.fixture(scope="module")
@@ -179,6 +176,47 @@ def test_record_ends_after_a_time(invoke: Invoke, capsys: pytest.CaptureFixture[
     capsys.readouterr()
 
 
+class _FakeRealSense:
+    """Stands for a live camera: images without end, until somebody interrupts it after the fifth."""
+
+    times_known, joint_names, lost = True, (), 2
+
+    def __init__(self, name: str, *, serial: str | None, pose: np.ndarray | None) -> None:
+        self.cameras = [replace(CAMERA, name=name, pose=pose)]
+        self.serial, self.is_open = serial, False
+
+    def __enter__(self) -> _FakeRealSense:
+        self.is_open = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.is_open = False
+
+    def frames(self) -> Iterator[Frame]:
+        for n in range(5):
+            assert self.is_open
+            depth = np.full((CAMERA.height, CAMERA.width), 1000 + n, dtype=np.uint16)
+            yield Frame("camera", 5.0 + n / 30.0, depth, 0.001)
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("options", "count"), [((), 5), (("--images", "2"), 2)])
+def test_a_live_camera_is_recorded_until_it_is_interrupted(
+    invoke: Invoke,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    options: tuple[str, ...],
+    count: int,
+) -> None:
+    monkeypatch.setattr(perception, "RealSense", _FakeRealSense)
+    assert invoke("record", "--realsense", "live", "--json", "-", *options) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["images"], document["lost"], document["joints"]) == (count, 2, [])
+    read = list(open_recording("live").frames())
+    assert [int(frame.depth[0, 0]) for frame in read] == [1000 + n for n in range(count)]
+    assert [frame.time for frame in read] == [5.0 + n / 30.0 for n in range(count)]
+
+
 @dataclass
 class _FakeCheck:
     """Stands for the core's `CameraCheck`: keeps what it is given, and finds what it is told."""
@@ -192,7 +230,7 @@ class _FakeCheck:
     def add_state(self, q: np.ndarray, *, time: float) -> None:
         self.states.append((time, q.copy()))
 
-    def add(self, depth: np.ndarray, *, time: float, unit: float) -> None:
+    def add(self, depth: np.ndarray, *, time: float, unit: float | None) -> None:
         self.images.append((time, depth.dtype, unit))
 
     def solve(self) -> SimpleNamespace:
@@ -207,8 +245,11 @@ def correction(**others: Any) -> SimpleNamespace:
         "clock_offset": -0.001,
         "rms_before": 0.004,
         "rms_after": 0.003,
-        "offset": 0.01,
-        "frames": 5,
+        "overshoot": 0.01,
+        "translation_spread": 0.0005,
+        "rotation_spread": 0.0004,
+        "clock_spread": 0.0003,
+        "images": 5,
         "points": 4000,
         "question": "",
     }
@@ -251,7 +292,6 @@ def test_check_says_whether_the_camera_is_where_it_is_told(
     assert fake.images[0] == (START, np.uint16, 0.001)
 
 
-@needs_check
 def test_check_finds_a_camera_that_is_moved(invoke: Invoke) -> None:
     moved = np.array(CAMERA.pose)
     moved[:3, 3] += 0.03 * moved[:3, 0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,7 +32,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sidestep import Arm
-    from sidestep.perception import DepthCamera
+    from sidestep.perception import CameraCorrection, DepthCamera
+
+APART = (
+    100.0  # [s] between two images of a recording without times: the arm stands in each, no clock is measured
+)
 
 
 def check(
@@ -84,24 +89,33 @@ def check(
     raise typer.Exit(0 if all(document["as_told"] for document in documents) else 1)
 
 
-def _corrections(opened: OpenSource, arm: Arm, cameras: list[DepthCamera], terminal: Console) -> list[Any]:
+def _corrections(
+    opened: OpenSource, arm: Arm, cameras: list[DepthCamera], terminal: Console
+) -> list[CameraCorrection]:
     """What `CameraCheck` finds of each camera, from all images with a joint state."""
-    from sidestep.perception import CameraCheck  # type: ignore[attr-defined]
+    from sidestep.perception import CameraCheck
     from sidestep.perception.playback import joint_order
 
     order = joint_order(opened.recording.joint_names, arm.robot.coordinate_names)
     checks = {camera.name: CameraCheck(arm, camera) for camera in cameras}
+    timed, latest = opened.recording.times_known, -math.inf
     with counted(terminal, "reading", opened.recording) as tell:
         for number, frame in enumerate(opened.recording.frames(), start=1):
-            if frame.q is not None:
-                for one in checks.values():
-                    one.add_state(frame.q[order], time=frame.time)
-                checks[frame.camera].add(frame.depth, time=frame.time, unit=frame.unit)
             tell(number)
+            if frame.q is None:
+                continue
+            q, time = frame.q[order], frame.time if timed else APART * number
+            for moment in (time,) if timed else (time - 0.25 * APART, time + 0.25 * APART):
+                if moment > latest:  # two cameras may have one time
+                    for one in checks.values():
+                        one.add_state(q, time=moment)
+                    latest = moment
+            unit = frame.unit if frame.depth.dtype == np.uint16 else None
+            checks[frame.camera].add(frame.depth, time=time, unit=unit)
     return [checks[camera.name].solve() for camera in cameras]
 
 
-def camera_document(camera: DepthCamera, found: Any, *, times_known: bool) -> dict[str, Any]:
+def camera_document(camera: DepthCamera, found: CameraCorrection, *, times_known: bool) -> dict[str, Any]:
     """A correction as JSON has it, and whether it is within the errors that the camera was said to have.
 
     Args:
@@ -109,6 +123,10 @@ def camera_document(camera: DepthCamera, found: Any, *, times_known: bool) -> di
         found: a `CameraCorrection`.
         times_known: whether the recording has times; the clock is not judged where it has none.
     """
+    # Of a recording without times the core asks after the clock, in vain.
+    question = found.question if times_known else ""
+    clock = found.clock_offset if times_known and math.isfinite(found.clock_offset) else None
+    repeats = found.translation_spread > 0.0  # else too few images to take half of them
     off = []
     if found.translation > camera.translation_error:
         off.append(
@@ -118,43 +136,49 @@ def camera_document(camera: DepthCamera, found: Any, *, times_known: bool) -> di
         off.append(
             f"turned by {np.rad2deg(found.rotation):.2f}°, more than {np.rad2deg(camera.rotation_error):.2f}°"
         )
-    if times_known and abs(found.clock_offset) > camera.clock_error:
-        off.append(
-            f"its clock off by {1e3 * found.clock_offset:.1f} ms, more than {1e3 * camera.clock_error:.1f} ms"
-        )
+    if clock is not None and abs(clock) > camera.clock_error:
+        off.append(f"its clock off by {1e3 * clock:.1f} ms, more than {1e3 * camera.clock_error:.1f} ms")
     return {
         "camera": camera.name,
-        "as_told": not off and not found.question,
+        "as_told": not off and not question,
         "off": off,
-        "question": found.question or None,
-        "translation_m": float(found.translation),
-        "rotation_rad": float(found.rotation),
-        "clock_offset_s": float(found.clock_offset) if times_known else None,
-        "rms_before_m": float(found.rms_before),
-        "rms_after_m": float(found.rms_after),
-        "cover_offset_m": float(found.offset),
-        "images": int(found.frames),
-        "points": int(found.points),
+        "question": question or None,
+        "translation_m": found.translation,
+        "translation_spread_m": found.translation_spread if repeats else None,
+        "rotation_rad": found.rotation,
+        "rotation_spread_rad": found.rotation_spread if repeats else None,
+        "clock_offset_s": clock,
+        "clock_spread_s": found.clock_spread if repeats and clock is not None else None,
+        "rms_before_m": found.rms_before,
+        "rms_after_m": found.rms_after,
+        "overshoot_m": found.overshoot,
+        "images": found.images,
+        "points": found.points,
         "pose": np.asarray(found.pose).tolist(),
     }
 
 
 def _print(document: dict[str, Any], terminal: Console) -> None:
-    clock = document["clock_offset_s"]
+    from rich.markup import escape
+
+    def measured(name: str, spread: str, factor: float, form: str) -> str:
+        if document[name] is None:
+            return "not known"
+        within = "" if document[spread] is None else f" ± {factor * document[spread]:{form}}"
+        return f"{factor * document[name]:{form}}{within}"
+
+    degree = float(np.rad2deg(1.0))
     table = figures_table(document["camera"], "")
     for name, value in (
-        ("moved by", f"{1e3 * document['translation_m']:.1f} mm"),
-        ("turned by", f"{np.rad2deg(document['rotation_rad']):.2f}°"),
-        (
-            "clock off by",
-            "not known: the recording has no times" if clock is None else f"{1e3 * clock:.1f} ms",
-        ),
-        ("distance to the arm, rms, as told", f"{1e3 * document['rms_before_m']:.1f} mm"),
-        ("distance to the arm, rms, corrected", f"{1e3 * document['rms_after_m']:.1f} mm"),
-        ("reach of the cover beyond the arm", f"{1e3 * document['cover_offset_m']:.1f} mm"),
+        ("moved by [mm]", measured("translation_m", "translation_spread_m", 1e3, ".1f")),
+        ("turned by [deg]", measured("rotation_rad", "rotation_spread_rad", degree, ".2f")),
+        ("clock off by [ms]", measured("clock_offset_s", "clock_spread_s", 1e3, ".1f")),
+        ("points to arm, rms, as told [mm]", f"{1e3 * document['rms_before_m']:.1f}"),
+        ("points to arm, rms, corrected [mm]", f"{1e3 * document['rms_after_m']:.1f}"),
+        ("cover beyond the arm, taken off [mm]", f"{1e3 * document['overshoot_m']:.1f}"),
         ("images, points", f"{document['images']}, {document['points']:,}"),
     ):
-        table.add_row(name, value)
+        table.add_row(escape(name), value)
     terminal.print(table)
     if document["question"]:
         terminal.print(document["question"], style="yellow", highlight=False, markup=False, soft_wrap=True)
