@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from sidestep.drawing.palette import BLUE, SERIES
 from sidestep.perception.colours import CELLS, PIXELS
@@ -89,6 +90,8 @@ def _png(draw: Callable[[Axes], None], axis: str) -> bytes:
     axes = figure.subplots()
     draw(axes)
     axes.set_xlabel(axis, fontsize=9)
+    if axis == "image":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=8)
