@@ -11,6 +11,7 @@ import typer
 from sidestep._core import __version__
 from sidestep.cli import (
     bench_command,
+    camera_command,
     fit_command,
     list_commands,
     prepare_command,
@@ -43,6 +44,7 @@ app.command("prepare")(prepare_command.prepare)
 app.command("replay")(replay_command.replay)
 for name, command in plugins("sidestep.commands").items():
     app.command(name)(command)
+app.add_typer(camera_command.app, name="camera")
 app.add_typer(bench_command.app, name="bench")
 
 

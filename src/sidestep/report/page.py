@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import html
 from collections.abc import Sequence
 from pathlib import Path
 
+from sidestep.report.page_parts import head, picture, table
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.summary import summary_rows
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; }
-body { max-width: 960px; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-table { border-collapse: collapse; }
-td { padding: .15rem 1.2rem .15rem 0; border-bottom: 1px solid #e4e4e4; }
-img { max-width: 100%; }
-.verdict { padding: .6rem 1rem; border-left: 6px solid #D55E00; background: #f6f6f6; }
-.success { border-color: #009E73; } pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; }
-"""
 _CAPTIONS = {
     "animation.gif": "The run (a cross marks the tip at the goal, a line the path of the tip)",
     "arm.png": "The arm at several instants",
@@ -38,23 +28,19 @@ def write_page(result: ScenarioResult, pictures: Sequence[Path], path: Path) -> 
     scenario = result.scenario
     verdict = "success" if result.success else "no success"
     parts = [
-        "<!doctype html><html lang='en'><meta charset='utf-8'>",
-        f"<title>Sidestep: {html.escape(scenario.name)}</title><style>{_STYLE}</style>",
+        head(scenario.name),
         f"<h1>{html.escape(scenario.name)}</h1><p>{html.escape(scenario.description)}</p>",
         f"<p><small>{html.escape(scenario.source)}</small></p>" if scenario.source else "",
         f"<p class='verdict {'success' if result.success else ''}'><b>{verdict.capitalize()}.</b> "
-        f"{html.escape(result.sentence())}</p><table>",
+        f"{html.escape(result.sentence())}</p>",
+        table((), summary_rows(result)),
     ]
-    for name, value, allowed in summary_rows(result):
-        parts.append(f"<tr><td>{html.escape(name)}<td>{html.escape(value)}<td>{html.escape(allowed)}")
-    parts.append("</table>")
-    known = {picture.name: picture for picture in pictures}
+    known = {path.name: path for path in pictures}
     captions = _CAPTIONS | ({"psi.png": "Embedding"} if scenario.method == "custom" else {})
     for name, caption in captions.items():
         if name in known:
             kind = "gif" if name.endswith("gif") else "png"
-            data = base64.b64encode(known[name].read_bytes()).decode("ascii")
-            parts.append(f"<h2>{caption}</h2><img alt='{caption}' src='data:image/{kind};base64,{data}'>")
+            parts.append(picture(known[name].read_bytes(), caption, kind=kind))
     parts.append(
         "<h2>Files</h2><p><code>log.npz</code> and <code>log.csv</code>: the run step by step; "
         "<code>result.json</code>: the figures; <code>scenario.yaml</code>: run it again with "

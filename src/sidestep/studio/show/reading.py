@@ -57,7 +57,7 @@ def read(source: str, options: Mapping[str, Any]) -> Reading:
         if Path(source).suffix.lower() == ARM_SUFFIX:
             arm: _core.Arm | None = Arm.load(source, **options)
             assert arm is not None
-            robot, kind = _with_links(arm.robot), "arm file"
+            robot, kind = with_links(arm.robot), "arm file"
             masses = [inertial.mass for inertial in arm.inertials]
             moving, whole = (sum(masses) if masses else None), None
         else:
@@ -89,7 +89,7 @@ def collected_warnings() -> Iterator[list[str]]:
             told += dict.fromkeys(str(item.message) for item in caught)
 
 
-def _with_links(core: _core.Robot) -> Robot:
+def with_links(core: _core.Robot) -> Robot:
     """The robot of an arm file, with links that have neither mesh nor inertia."""
     links = tuple(Link(frame.name) for frame in core.frames)
     tree = KinematicTree(
