@@ -50,6 +50,15 @@ bool is_viable(double q, double v, const ScalarLimits& limits, double period, do
          q - braking_distance(-v, limits.acceleration, period) >= limits.lower - tolerance;
 }
 
+double viable_velocity(double q, double v, const ScalarLimits& limits, double period) noexcept {
+  const auto fastest = [&](double distance_left) {
+    return distance_left == infinity
+               ? limits.velocity
+               : std::min(limits.velocity, speed_within(std::max(distance_left, 0.0), 0.0, limits.acceleration, period));
+  };
+  return std::clamp(v, -fastest(q - limits.lower), fastest(limits.upper - q));
+}
+
 AccelerationInterval acceleration_interval(double q, double v, const ScalarLimits& limits, double period) noexcept {
   const double V = limits.velocity, A = limits.acceleration;
   double high = largest_next_velocity(limits.upper - q, v, A, period);

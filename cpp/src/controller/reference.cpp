@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sidestep/constraints/acceleration_bounds.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -31,6 +33,15 @@ void Reference::hold(ControllerSettings::Output output, const Tick& tick) noexce
   }
   next_v = v + t * a;
   next_q = q + t * v + 0.5 * t * (t + T) * a;
+}
+
+void Reference::keep_viable(const JointLimits& limits, const ControllerSettings& settings, double period) noexcept {
+  const double margin = settings.position_margin, share = 1.0 - settings.limit_margin;
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    v[j] = viable_velocity(
+        q[j], v[j], {limits.lower[j] + margin, limits.upper[j] - margin, limits.velocity[j], share * limits.acceleration[j]},
+        period);
+  }
 }
 
 void Reference::advance(const Eigen::VectorXd& acceleration, bool rises, const Eigen::VectorXd& jerk, double period) noexcept {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "sidestep/controller/settings.hpp"
+#include "sidestep/robot/robot.hpp"
 #include "tick.hpp"
 
 namespace sidestep {
@@ -25,6 +26,9 @@ struct Reference {
     q = next_q;
     v = next_v;
   }
+  /// Slows a motion that begins at (q, v) down to what can be braked within the limits, see `viable_velocity`. An arm that something
+  /// flings can be faster: feedback brakes it.
+  void keep_viable(const JointLimits& limits, const ControllerSettings& settings, double period) noexcept;
   /// Integrates over the period T [s]; an acceleration that is not finite leaves that of the period before.
   /// `rises`: the acceleration goes beyond the jerk limits [/s³]; the next ones go on from what jerk allows.
   void advance(const Eigen::VectorXd& acceleration, bool rises, const Eigen::VectorXd& jerk, double period) noexcept;

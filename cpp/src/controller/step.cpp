@@ -102,8 +102,12 @@ bool Controller::Impl::follow_arm(const Tick& tick) noexcept {
   const double lead = tracker_.drives_track() ? 0.0 : tick.lead();
   command_.tracking_error = begins ? 0.0 : (reference_.next_q - lead * reference_.next_v - q).cwiseAbs().maxCoeff();
   reference_.go_on();
-  if (touch_.is_touched() && tracker_.yield(q, dynamics_.mass(), touch_.resistance(), tick, reference_)) {
+  const bool yields = touch_.is_touched() && tracker_.yield(q, dynamics_.mass(), touch_.resistance(), tick, reference_);
+  if (yields) {
     guard_.reset();
+  }
+  if (begins || yields) {
+    reference_.keep_viable(model.arm.robot().limits(), model.settings, tick.period);
   }
   tracker_.write_coupling(reference_, q, tick, state_.coupling);
   const bool apart = reference_.q != q || reference_.v != v;

@@ -75,7 +75,12 @@ bool Tracker::yield(const Eigen::VectorXd& arm_q, const Eigen::MatrixXd& mass, c
   for (Eigen::Index j = 0; j < arm_q.size(); ++j) {
     const double most = torque[j] / (w * w), pushes = mass.col(j).dot(reference.q - arm_q);
     if (std::abs(pushes) > most) {
-      reference.q -= (pushes - std::copysign(most, pushes)) / mass.col(j).squaredNorm() * mass.col(j);
+      const double share = (pushes - std::copysign(most, pushes)) / mass.col(j).squaredNorm();
+      for (Eigen::Index k = 0; k < arm_q.size(); ++k) {  // beyond a position limit never farther than it is
+        const double q = reference.q[k], margin = settings_.position_margin;
+        reference.q[k] =
+            std::clamp(q - share * mass(k, j), std::min(q, limits_.lower[k] + margin), std::max(q, limits_.upper[k] - margin));
+      }
       moved = true;
     }
   }

@@ -80,6 +80,29 @@ BOOST_AUTO_TEST_CASE(braking_distance_is_that_of_braking) {
   BOOST_TEST(braking_distance(2.0, infinity, 0.001) == 0.001);  // to rest within one period
 }
 
+BOOST_AUTO_TEST_CASE(the_viable_velocity_is_the_fastest_from_which_the_limits_can_be_kept) {
+  Random random(5);
+  for (int trial = 0; trial < 2000; ++trial) {
+    double period = 0.0, q = 0.0, v = 0.0;
+    const ScalarLimits limits = random_limits(random, period);
+    random_viable_state(random, limits, period, q, v);
+    BOOST_REQUIRE(std::abs(viable_velocity(q, v, limits, period) - v) < rounding);
+    const double up = viable_velocity(q, 1e3, limits, period), down = viable_velocity(q, -1e3, limits, period);
+    const double more = 1e-6 * (1.0 + up), less = -1e-6 * (1.0 - down);
+    BOOST_REQUIRE(up >= 0.0);
+    BOOST_REQUIRE(down <= 0.0);
+    BOOST_REQUIRE(is_viable(q, up, limits, period, rounding));
+    BOOST_REQUIRE(is_viable(q, down, limits, period, rounding));
+    BOOST_REQUIRE((up == 1e3 || !is_viable(q, up + more, limits, period)));
+    BOOST_REQUIRE((down == -1e3 || !is_viable(q, down + less, limits, period)));
+  }
+  const ScalarLimits limits{-1.0, 1.0, 2.0, 10.0};
+  BOOST_TEST(viable_velocity(0.0, 5.0, limits, 0.001) == 2.0);                     // the velocity limit
+  BOOST_TEST(viable_velocity(0.95, 5.0, limits, 0.001) == 1.0, tolerance(1e-12));  // v²/2A = 50 mm, in whole periods
+  BOOST_TEST(viable_velocity(1.2, 0.5, limits, 0.001) == 0.0);                     // beyond the limit, not farther out
+  BOOST_TEST(viable_velocity(1.2, -0.5, limits, 0.001) == -0.5);
+}
+
 BOOST_AUTO_TEST_CASE(any_choice_from_a_viable_state_stays_inside_for_ever) {
   // 3e4 trajectories of 100 steps, 3 million in all: at one end of the interval, jumping between both, or anywhere.
   Random random(2);

@@ -3,6 +3,7 @@
 
 #include "../../src/controller/reference.hpp"
 #include "support/numbers.hpp"
+#include "support/stage_model.hpp"
 
 using namespace sidestep;
 
@@ -86,4 +87,19 @@ BOOST_AUTO_TEST_CASE(a_motion_that_begins_takes_small_velocities_for_rest_and_dr
   reference.next_q = Eigen::Vector2d(0.5, 0.5);
   reference.begin(at, Eigen::Vector2d(0.4, 0.4), true);
   BOOST_TEST((reference.next_v == Eigen::Vector2d(0.0, 0.4)));  // the second joint moves away from the old command
+}
+
+BOOST_AUTO_TEST_CASE(what_begins_too_fast_to_brake_begins_as_fast_as_can_be_braked) {
+  JointLimits limits = test::arm_limits(2);  // 2.5 rad, 2.5 rad/s, 10 rad/s²
+  ControllerSettings settings;
+  settings.limit_margin = 0.0;
+  settings.position_margin = 0.1;
+  Reference reference = test::reference_at(Eigen::Vector2d(2.35, -1.0), Eigen::Vector2d(5.0, -4.0));
+  reference.keep_viable(limits, settings, reference_period);
+  BOOST_TEST((reference.q == Eigen::Vector2d(2.35, -1.0)));
+  BOOST_TEST((reference.v - Eigen::Vector2d(1.0, -2.5)).norm() < 1e-12);  // v²/2A = 50 mrad; the velocity limit
+  const Eigen::Vector2d slow(0.9, 2.4);
+  reference.v = slow;
+  reference.keep_viable(limits, settings, reference_period);
+  BOOST_TEST((reference.v == slow));
 }

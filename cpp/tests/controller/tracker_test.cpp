@@ -158,3 +158,18 @@ BOOST_AUTO_TEST_CASE(a_reference_yields_to_where_feedback_pushes_by_a_torque_at_
   }
   BOOST_TEST((pushes(far).cwiseAbs().array() < 1.01 * most.array()).all());
 }
+
+BOOST_AUTO_TEST_CASE(a_reference_yields_no_farther_than_to_its_position_limits) {
+  Tracking t(Output::torque);
+  const Eigen::VectorXd none = Eigen::Vector2d::Zero();
+  t.q = Eigen::Vector2d(2.7, 0.7);  // pushed 0.2 rad beyond the limit of 2.5 rad
+  t.dynamics.update(test::state_at(t.model.arm.robot(), t.q), {});
+  Reference inside = test::reference_at(Eigen::Vector2d(2.4, 0.7), none), outside = inside;
+  outside.q[0] = 2.6;
+  for (int k = 0; k < 100; ++k) {
+    static_cast<void>(t.tracker.yield(t.q, t.dynamics.mass(), none, t.tick, inside));
+    static_cast<void>(t.tracker.yield(t.q, t.dynamics.mass(), none, t.tick, outside));
+  }
+  BOOST_TEST(inside.q[0] == 2.5);
+  BOOST_TEST(outside.q[0] <= 2.6);
+}

@@ -68,6 +68,30 @@ BOOST_AUTO_TEST_CASE(velocities_lead_the_arm_back_to_the_reference) {
   BOOST_TEST(std::abs(command.tracking_error - 0.05) < 1e-12);
 }
 
+BOOST_AUTO_TEST_CASE(an_arm_that_is_flung_at_a_position_limit_is_commanded_to_stay_within_it) {
+  // 0.1 rad before it at 2 rad/s, 10 rad/s² would need 0.2 rad. What is commanded begins slower, and feedback brakes the arm.
+  for (const auto output : {ControllerSettings::Output::torque, ControllerSettings::Output::acceleration}) {
+    const JointLimits limits = limits_with_rates();
+    Controller controller(covered_arm(limits), repeatable_settings(output));
+    controller.set_obstacles(Obstacles::none());
+    const double period = controller.settings().period;
+    Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv);
+    q[6] = limits.upper[6] - 0.1;
+    v[6] = 2.0;
+    double farthest = 0.0;
+    for (int k = 0; k < 500; ++k) {
+      const Command& command = controller.step(q, v);
+      BOOST_REQUIRE((command.position.array() <= limits.upper.array()).all());
+      BOOST_REQUIRE((command.velocity.cwiseAbs().array() <= limits.velocity.array()).all());
+      v += period * command.acceleration;
+      q += period * v;
+      farthest = std::max(farthest, q[6]);
+    }
+    // Feedback by torque may exceed the acceleration limit; without torque no arm brakes in less than v²/2A = 0.204 rad.
+    BOOST_TEST(farthest < limits.upper[6] + (output == ControllerSettings::Output::torque ? 0.01 : 0.105));
+  }
+}
+
 BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
   JointLimits limits = limits_with_rates();
   limits.jerk.setConstant(200.0);

@@ -99,6 +99,10 @@ double jerk_braking_distance(double v, double a, double acceleration, double jer
 /// Whether a joint can be kept inside its limits for ever from this state, up to `tolerance` [rad | m, and /s].
 bool is_viable(double q, double v, const ScalarLimits& limits, double period, double tolerance = 0.0) noexcept;
 
+/// The velocity nearest to v from which a joint at q can be kept inside its limits for ever; beyond a position limit, the nearest
+/// that does not lead farther out.
+double viable_velocity(double q, double v, const ScalarLimits& limits, double period) noexcept;
+
 /// The accelerations after which the next state is viable; see the derivation above. Never empty: lower <= upper, and
 /// both within the acceleration limit. q and v finite, period > 0.
 AccelerationInterval acceleration_interval(double q, double v, const ScalarLimits& limits, double period) noexcept;
