@@ -298,11 +298,12 @@ void bind_check(nb::module_& m) {
 nb::dict cells_of(const Perception& self) {
   const std::vector<Perception::Cell> cells = self.cells();
   const auto num = static_cast<Eigen::Index>(cells.size());
-  Eigen::Matrix3Xd centres(3, num);
+  Eigen::Matrix3Xd centres(3, num), velocities(3, num);
   Eigen::VectorXd radii(num), ages(num), cameras(num), remembered(num), hidden(num);
   for (Eigen::Index n = 0; n < num; ++n) {
     const Perception::Cell& cell = cells[static_cast<std::size_t>(n)];
     centres.col(n) = cell.centre;
+    velocities.col(n) = cell.velocity;
     radii[n] = cell.radius;
     ages[n] = cell.age;
     cameras[n] = cell.camera;
@@ -311,6 +312,7 @@ nb::dict cells_of(const Perception& self) {
   }
   nb::dict all;
   all["centres"] = to_numpy_points(centres);
+  all["velocities"] = to_numpy_points(velocities);
   all["radii"] = to_numpy(radii);
   all["ages"] = to_numpy(ages);
   all["cameras"] = to_numpy(cameras).attr("astype")("int64");
@@ -400,7 +402,7 @@ void bind_perception(nb::module_& m) {
            nb::arg("camera"), nb::sig("def labels(self, camera: str) -> numpy.typing.NDArray[numpy.uint8]"),
            "What each pixel of the last image shows (height, width), a PixelLabel each.")
       .def("cells", &cells_of, nb::sig("def cells(self) -> dict[str, numpy.typing.NDArray[typing.Any]]"),
-           "The obstacles that were handed to the controller: centres (N, 3) [m], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):\n"
+           "The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):\n"
            "no camera shows it now, hidden (N,): something is in front of it.")
       .def("unseen", [](const Perception& self) { return to_numpy_points(self.unseen()); }, nb::sig("def unseen(self) -> numpy.typing.NDArray[numpy.float64]"),
            "Middles (N, 3) of cells where nobody has looked and that border on seen space [m].");

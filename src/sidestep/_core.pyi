@@ -4253,7 +4253,7 @@ class Perception:
 
     def cells(self) -> dict[str, numpy.typing.NDArray[Any]]:
         """
-        The obstacles that were handed to the controller: centres (N, 3) [m], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
+        The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
         no camera shows it now, hidden (N,): something is in front of it.
         """
 

@@ -215,6 +215,7 @@ Obstacles Perception::Impl::moving_balls(View& view, double time) {
       found.velocities.col(n).setZero();
       found.uncertainty[n] = std::max(found.uncertainty[n], speed);
     }
+    velocities[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])] = found.velocities.col(n).cast<float>();
   }
   return balls.moving(std::move(found.velocities), std::move(found.uncertainty));
 }
@@ -224,6 +225,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
   const std::vector<Voxel>& voxels = map.voxels();
   tested.resize(voxels.size());
   is_excluded.resize(voxels.size());
+  velocities.resize(voxels.size(), Eigen::Vector3f::Zero());
   shown.clear();
   remembered.clear();
   for (const int index : map.touched()) {
@@ -275,8 +277,10 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
   for (std::size_t n = 0; n < is_excluded.size(); ++n) {
     const Voxel& voxel = map.voxels()[n];
     if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0) {
+      const bool is_remembered = voxel.shown_by == 0;
+      const Eigen::Vector3d velocity = is_remembered ? Eigen::Vector3d::Zero() : Eigen::Vector3d(velocities[n].cast<double>());
       all.push_back(
-          {centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, voxel.shown_by == 0, voxel.is_hidden});
+          {centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, is_remembered, velocity, voxel.is_hidden});
     }
   }
   return all;

@@ -82,6 +82,7 @@ struct Perception::Impl {
   std::vector<Tested> tested;     // one per voxel
   std::vector<int> shown, remembered;  // Voxels that a camera shows, and that none shows, in work.
   std::vector<int> last_remembered;    // The latter, as the controller has them.
+  std::vector<Eigen::Vector3f> velocities;  // Per voxel, as the last image that showed it says [m/s].
   std::vector<char> is_excluded;  // Per voxel: explained or left out.
 };
 

@@ -1,10 +1,13 @@
 // The whole path: what a controller gets from images, by source and time.
 #include "sidestep/perception/perception.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <boost/test/unit_test.hpp>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "support/covered_arm.hpp"
@@ -138,6 +141,48 @@ BOOST_FIXTURE_TEST_CASE(a_camera_on_a_link_is_where_the_arm_was, Watched) {
   BOOST_TEST(report.used);
   BOOST_TEST((perception->pose("front").matrix() - X_WC.matrix()).norm() < 1e-12);
   BOOST_TEST(points("front", X_WC * Eigen::Vector3d(0.0, 0.0, 0.5), 0.03) > 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  scene.floor = -10.0;
+  for (int n = 0; n < 15; ++n) {
+    scene.balls.front().centre.y() = 0.9 - 0.5 * 0.03 * n;
+    look();
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int num = 0;
+  for (const Perception::Cell& cell : perception->cells()) {
+    if ((cell.centre - scene.balls.front().centre).norm() < 0.17 && !cell.is_remembered) {
+      sum += cell.velocity;
+      ++num;
+    }
+  }
+  BOOST_TEST(num > 20);
+  BOOST_TEST((sum / num - Eigen::Vector3d(0.0, -0.5, 0.0)).norm() <
+             0.15);  // cells of 2 cm stand still, images 12 cm apart are compared
+}
+
+BOOST_FIXTURE_TEST_CASE(images_come_while_steps_go_on, Watched) {
+  start();
+  step();
+  std::atomic<bool> ends{false};
+  std::thread camera_thread([&] {
+    while (!ends.load()) {
+      look(Capture{controller.time(), {}, std::nullopt});
+    }
+  });
+  const Eigen::VectorXd v = Eigen::VectorXd::Zero(4);
+  double now = time;
+  for (int n = 0; n < 300; ++n) {
+    controller.step(q, v, now += 0.001);
+  }
+  ends = true;
+  camera_thread.join();
+  BOOST_TEST(perception->time("front") >= 10.0);
+  BOOST_TEST(controller.time() == now);
 }
 
 BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {

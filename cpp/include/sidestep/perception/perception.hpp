@@ -81,12 +81,13 @@ class Perception {
 
   /// An obstacle as it was handed to the controller.
   struct Cell {
-    Eigen::Vector3d centre;  ///< [m] in the world
-    double radius;           ///< [m]
-    int camera;              ///< that showed it last
-    double age;              ///< since it was shown last, at the last image of any camera [s]
-    bool is_remembered;      ///< no camera shows it now
-    bool is_hidden;          ///< something is in front of it
+    Eigen::Vector3d centre;    ///< [m] in the world
+    double radius;             ///< [m]
+    int camera;                ///< that showed it last
+    double age;                ///< since it was shown last, at the last image of any camera [s]
+    bool is_remembered;        ///< no camera shows it now
+    Eigen::Vector3d velocity;  ///< as the controller was told [m/s]
+    bool is_hidden;            ///< something is in front of it
   };
   std::vector<Cell> cells() const;
   /// Middles (3 × N) of cells where nobody has looked and that border on seen space [m].
