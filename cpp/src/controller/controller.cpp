@@ -98,6 +98,10 @@ std::shared_ptr<const Obstacles> Controller::obstacles_of(const std::string& sou
   const std::lock_guard lock(setters_);
   return registry_->said(source);
 }
+std::vector<SourceContent> Controller::said() const {
+  const std::lock_guard lock(setters_);
+  return registry_->said();
+}
 std::vector<SourceState> Controller::sources() const { return impl_->sources().states(); }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, double time) noexcept {

@@ -124,6 +124,14 @@ std::shared_ptr<const Obstacles> SourceRegistry::said(const std::string& source)
   return entry == nullptr ? nullptr : entry->set.points;
 }
 
+std::vector<SourceContent> SourceRegistry::said() const {
+  std::vector<SourceContent> all;
+  for (const Entry& entry : entries_) {
+    all.push_back({entry.set.name, entry.set.time, entry.set.points});
+  }
+  return all;
+}
+
 SourceRegistry::Entry& SourceRegistry::at(const std::string& source) {
   if (Entry* const entry = find(source)) {
     return *entry;

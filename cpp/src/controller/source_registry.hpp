@@ -35,6 +35,8 @@ class SourceRegistry {
 
   /// What a source said last; null: there is none of the name.
   std::shared_ptr<const Obstacles> said(const std::string& source) const noexcept;
+  /// What all sources said last.
+  std::vector<SourceContent> said() const;
   /// All sources, as a step takes them.
   World world() const;
 

@@ -145,28 +145,46 @@ void Perception::Impl::add_unseen(const SeenImage& seen) {
   }
 }
 
-bool Perception::Impl::is_explained(std::size_t number, const Obstacles* told) {
+void Perception::Impl::find_told(double time) {
+  told.clear();
+  told_version = 0;
+  for (SourceContent& source : controller.said()) {
+    const bool is_own =
+        source.name == memory_source || source.name == unseen_source ||
+        std::any_of(views.begin(), views.end(), [&](const View& view) { return view.camera.name == source.name; });
+    if (is_own || source.obstacles->size() == 0) {
+      continue;
+    }
+    told_version += source.obstacles->version();
+    if (source.obstacles->tree().moves() && std::isfinite(source.time)) {  // where it was when the image was captured
+      auto then = std::make_shared<Obstacles>(*source.obstacles);
+      then->advance(time - source.time);
+      source.obstacles = std::move(then);
+    }
+    told.push_back(std::move(source.obstacles));
+  }
+}
+
+bool Perception::Impl::is_explained(std::size_t number) {
   const Voxel& voxel = map.voxels()[number];
   Tested& last = tested[number];
-  const std::uint64_t version = told == nullptr ? 0 : told->version();
   const bool has_grown = (low_of(voxel) - Eigen::Vector3f(last.low).cast<double>()).minCoeff() < -grown ||
                          (high_of(voxel) - Eigen::Vector3f(last.high).cast<double>()).maxCoeff() > grown;
-  if (last.cell == voxel.cell && last.version == version && !has_grown) {
+  if (last.cell == voxel.cell && last.version == told_version && !has_grown) {
     return last.is_explained;
   }
   std::copy(voxel.low, voxel.low + 3, last.low);
   std::copy(voxel.high, voxel.high + 3, last.high);
   last.cell = voxel.cell;
-  last.version = version;
-  last.is_explained = false;
-  if (told != nullptr) {
-    const View& view = views[voxel.camera];
-    const Eigen::Vector3d centre = centre_of(voxel);
-    const double depth = (centre - view.X_WC.translation()).norm();
-    const double error = static_cast<double>(voxel.error) + noise_explained * view.camera.noise.sigma(depth);
-    const double thin = 0.5 * (high_of(voxel) - low_of(voxel)).minCoeff();
-    last.is_explained = distance_to(*told, centre, error + 1e-6) + thin <= error;
-  }
+  last.version = told_version;
+  const View& view = views[voxel.camera];
+  const Eigen::Vector3d centre = centre_of(voxel);
+  const double depth = (centre - view.X_WC.translation()).norm();
+  const double error = static_cast<double>(voxel.error) + noise_explained * view.camera.noise.sigma(depth);
+  const double thin = 0.5 * (high_of(voxel) - low_of(voxel)).minCoeff();
+  last.is_explained = std::any_of(told.begin(), told.end(), [&](const std::shared_ptr<const Obstacles>& shapes) {
+    return distance_to(*shapes, centre, error + 1e-6) + thin <= error;
+  });
   return last.is_explained;
 }
 
@@ -221,7 +239,7 @@ Obstacles Perception::Impl::moving_balls(View& view, double time) {
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
-  const std::shared_ptr<const Obstacles> told = controller.obstacles_of(SourceOptions::scene);
+  find_told(time);
   const std::vector<Voxel>& voxels = map.voxels();
   tested.resize(voxels.size());
   is_excluded.resize(voxels.size());
@@ -233,7 +251,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     if (!voxels[n].counts || map.is_background(voxels[n])) {
       continue;
     }
-    is_excluded[n] = is_explained(n, told.get()) || is_left_out(voxels[n]) ? 1 : 0;
+    is_excluded[n] = is_explained(n) || is_left_out(voxels[n]) ? 1 : 0;
     if (is_excluded[n] == 0) {
       shown.push_back(index);
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -28,7 +29,7 @@ struct Perception::Impl {
     double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
-    VelocityEstimate motion;  // of what the camera shows
+    VelocityEstimate motion;                                   // of what the camera shows
   };
   struct Region {
     std::string name;
@@ -61,7 +62,9 @@ struct Perception::Impl {
   void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
   /// What a camera shows, with velocities.
   Obstacles moving_balls(View& view, double time);
-  bool is_explained(std::size_t voxel, const Obstacles* told);
+  /// Takes what other sources say, where it was at a time [s].
+  void find_told(double time);
+  bool is_explained(std::size_t voxel);
   bool is_left_out(const Voxel& voxel) const;
   bool drop_region(const std::string& name);
   std::vector<Cell> cells() const;
@@ -79,11 +82,13 @@ struct Perception::Impl {
   double unseen_time = -std::numeric_limits<double>::infinity();  // Time at which its border was found [s].
   Eigen::Matrix3Xd border{3, 0};
   std::vector<Region> regions;
-  std::vector<Tested> tested;     // one per voxel
-  std::vector<int> shown, remembered;  // Voxels that a camera shows, and that none shows, in work.
-  std::vector<int> last_remembered;    // The latter, as the controller has them.
-  std::vector<Eigen::Vector3f> velocities;  // Per voxel, as the last image that showed it says [m/s].
-  std::vector<char> is_excluded;  // Per voxel: explained or left out.
+  std::vector<std::shared_ptr<const Obstacles>> told;  // what other sources say
+  std::uint64_t told_version = 0;                      // Sum of their versions.
+  std::vector<Tested> tested;                          // one per voxel
+  std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
+  std::vector<int> last_remembered;                    // The latter, as the controller has them.
+  std::vector<Eigen::Vector3f> velocities;             // Per voxel, as the last image that showed it says [m/s].
+  std::vector<char> is_excluded;                       // Per voxel: explained or left out.
 };
 
 }  // namespace sidestep

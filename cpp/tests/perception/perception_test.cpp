@@ -116,6 +116,12 @@ BOOST_FIXTURE_TEST_CASE(told_shapes_explain_their_points_and_regions_are_left_ou
   controller.remove_obstacles("scene");
   look();
   BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
+  controller.set_obstacles(test::ball({0.2, 0.9, 0.5}, 0.15), {.source = "tracker"});
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == 0);
+  controller.remove_obstacles("tracker");
+  look();
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
   perception->leave_out("cup", test::ball({0.2, 0.9, 0.5}, 0.1), 0.08);
   look();
   BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == 0);

@@ -136,6 +136,8 @@ class Controller {
   void remove_obstacle(const std::string& name, const std::string& source = SourceOptions::scene);
   /// What a source said last, as it was given; null: nothing. From any thread.
   std::shared_ptr<const Obstacles> obstacles_of(const std::string& source) const;
+  /// What all sources said last. From any thread.
+  std::vector<SourceContent> said() const;
   /// What is believed of each source. Only for the thread of `step`; allocates.
   std::vector<SourceState> sources() const;
   /// Where the arm was at its last steps, on the clock of `step`; from any thread.

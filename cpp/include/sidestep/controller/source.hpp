@@ -1,7 +1,10 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <string>
+
+#include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
 
@@ -16,6 +19,13 @@ struct SourceOptions {
   /// where such sets came three times within that; else ControllerSettings::obstacle_timeout.
   double valid_for = untold;
   bool finds_velocities = true;  ///< Velocities that are not told are found from set to set, where sets come again and again.
+};
+
+/// What a source said last, as it was given.
+struct SourceContent {
+  std::string name;
+  double time = SourceOptions::untold;  ///< when it was captured [s], on the clock of Controller::step; NaN: not told
+  std::shared_ptr<const Obstacles> obstacles;
 };
 
 /// What a controller believes of a source.
