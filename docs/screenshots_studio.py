@@ -16,13 +16,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sidestep.math.pose import pose_at
 from sidestep.report import write_report
 from sidestep.scenario import Scenario
 from sidestep.scenario.runner import run_scenario
 from sidestep.studio import messages as m
 from sidestep.studio.camera_choice import HAND, CameraChoice, camera_at
-from sidestep.studio.gallery import GALLERY, MOUSE_BALL
+from sidestep.studio.gallery import GALLERY
 from sidestep.studio.headless import (
     CLOSE_NOTICE,
     Window,
@@ -44,7 +43,6 @@ PLANAR = Path(__file__).parents[1] / "examples" / "planar3.urdf"
 ADVANCED = ("Method", "Show", "Scenario")  # tabs inside of this tab
 READY, PATIENCE = 600.0, 120.0  # [s] at most
 CAMERA_IMAGES, CAMERA_MOMENT = 15, 3.0  # and [s], after which a picture of a camera shows what is hidden
-FEW = 10  # moving cells, more than noise makes
 FARTHER = 1.6  # times as far away as the window opens
 MOMENT = 0.8  # [s] of simulated time at which the arm is on its way
 NUM_THINGS = len(starting_scenario().obstacles)
@@ -219,12 +217,6 @@ def depth_camera(camera: Photographer) -> None:
             studio.send(m.SetRunning(False))
             clock.sleep(1.0)
             camera.keep(studio, page, f"depth-camera{name}")
-        studio.send(m.SetRunning(True))
-        studio.send(m.DragObstacle(MOUSE_BALL, pose_at((0.9, -0.5, 0.9))))  # at most as fast as a hand
-        until(lambda: len(studio.snapshot.camera.moving) > FEW, "its motion")  # type: ignore[union-attr]
-        studio.send(m.SetRunning(False))
-        clock.sleep(1.0)
-        camera.keep(studio, page, "depth-camera-moving")
 
 
 def shows(studio: Studio, place: str) -> bool:

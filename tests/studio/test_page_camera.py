@@ -10,8 +10,8 @@ import pytest
 from sidestep.studio import messages as m
 from sidestep.studio.sight import CameraState
 from sidestep.studio.studio import Studio
+from studio.egl import NEEDS_EGL
 from studio.looker import ON_THE_PAGE, Looker, last, until
-from studio.test_session_camera import NEEDS_EGL
 
 pytestmark = [*ON_THE_PAGE, NEEDS_EGL, pytest.mark.slow]
 

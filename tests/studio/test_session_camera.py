@@ -9,24 +9,12 @@ import numpy as np
 import pytest
 
 from sidestep import Scenario
-from sidestep.simulation.depth_renderer import _start_opengl
 from sidestep.studio import messages as m
 from sidestep.studio.camera_choice import HAND, PLACES, CameraChoice, believed_noise, camera_at
 from sidestep.studio.session import Session
 from sidestep.studio.sight import HIDDEN, REMEMBERED, SEEN
+from studio.egl import NEEDS_EGL
 
-
-def egl_works() -> bool:
-    try:
-        _start_opengl(8, 8).free()
-    except RuntimeError:
-        return False
-    return True
-
-
-NEEDS_EGL = pytest.mark.skipif(
-    not egl_works(), reason="there is no EGL here (apt-get install libegl1 libgl1-mesa-dri)"
-)
 Make = Callable[..., Session]
 
 
@@ -93,6 +81,22 @@ def test_what_the_hand_no_longer_shows_is_remembered(session: Session) -> None:
     assert (
         0.4 < sight.ages.min() <= sight.ages.max() < 0.8
     )  # [s] in view up to 0.9 s, of 1.45 s at the last image
+
+
+@NEEDS_EGL
+def test_what_moves_is_told_apart(session: Session) -> None:
+    session.handle(m.SetCamera(choice_of(session, only=True, noise="none", rate=30.0)))
+    rests = run(session, 500)
+    assert len(rests.camera.moving) == 0
+    session.handle(m.ThrowObstacle("ball", np.array([0.0, -0.5, 0.0])))
+    now = run(session, 500)
+    assert len(now.camera.moving) > 20
+    np.testing.assert_allclose(
+        now.camera.speeds, 0.5, atol=0.15
+    )  # [m/s] of cells of 2 cm, in images 33 ms apart
+    away = np.linalg.norm(now.camera.moving[:, :3] - now.poses[0][:3, 3], axis=1)
+    assert away.max() < 0.09  # [m] the ball has 6 cm
+    assert now.touched == 0
 
 
 @NEEDS_EGL
