@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from sidestep._core import PixelLabel
-from sidestep.perception.colours import COLOURS
+from sidestep.perception.colours import label_palette
 from sidestep.studio.camera_choice import CameraChoice
 from sidestep.studio.page.camera_words import words_of
 from sidestep.studio.page.labelled_image import labelled_image
@@ -79,7 +79,9 @@ def test_near_is_light_and_the_arm_has_its_colour() -> None:
     picture = labelled_image(depth, labels)[0]
     assert (picture[0] == picture[0, 0]).all()  # grey
     assert picture[0, 0] > 230 > 100 > picture[1, 0]
-    np.testing.assert_allclose(picture[2], 255 * np.array(COLOURS["arm"]), atol=3)  # the nearest: full colour
-    assert picture[3, 0] > 3 * picture[3, 1]
+    np.testing.assert_allclose(picture[2], label_palette()[int(PixelLabel.arm.value)], atol=3)  # the nearest
+    white = label_palette()[int(PixelLabel.edge.value)]
+    assert (picture[3] < white).all()  # farther off, darker
+    assert picture[3].min() > 150
     assert (picture[4] == 0).all()
     assert picture[5].max() < 80

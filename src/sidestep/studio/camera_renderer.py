@@ -26,7 +26,7 @@ from sidestep.studio.process_link import connect_to_parent
 from sidestep.studio.scene_obstacle import SceneObstacle
 
 WALLS = 10.0  # [m] away is what is behind all: a room has walls, and rays that see nothing would tell nothing
-POLITE = 10  # niceness: rendering without a graphics card leaves the processor to the loop
+POLITE = 5  # niceness: rendering without a graphics card leaves the processor to the loop
 
 
 class Renderer:

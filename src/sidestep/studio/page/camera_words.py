@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import html
 
-from sidestep.perception.colours import COLOURS
+from sidestep.perception.colours import CELLS, PIXELS
 from sidestep.studio.sight import KINDS, STAGES, CameraState, Sight
 
 BOX = "font-size:12px;line-height:1.4;padding:2px 10px"
-CELLS = {"seen": "seen now", "remembered": "remembered", "hidden": "hidden"}
-PIXELS = {  # of the image
-    "obstacle": "obstacles (grey: depth)",
+KINDS_IN_WORDS = {"seen": "seen now", "remembered": "remembered", "hidden": "hidden"}
+PIXELS_IN_WORDS = {  # of the image
+    "obstacle": "obstacles, in grey",
     "arm": "taken out as arm",
     "edge": "flying pixels",
     "explained": "explained",
     "outside": "out of range",
     "nothing": "no depth",
 }
+COLOURS = {**PIXELS, **CELLS, "obstacle": "#9E9E9E"}  # in the image, obstacles have the greys of their depths
 
 
 def words_of(state: CameraState, *, running: bool) -> str:
@@ -46,7 +47,7 @@ def cell_rows(sight: Sight) -> list[str]:
     for kind, name in enumerate(KINDS):
         ages = sight.ages[sight.kinds == kind]
         age = f"{ages.min():.1f} to {ages.max():.1f} s" if len(ages) and kind else ""
-        rows.append(row(name, CELLS[name], str(len(ages)), age))
+        rows.append(row(name, KINDS_IN_WORDS[name], str(len(ages)), age))
     return rows
 
 
@@ -66,7 +67,10 @@ def beside_rows(state: CameraState) -> list[str]:
 def pixel_rows(sight: Sight) -> list[str]:
     """Shares of the image."""
     head = '<tr><td colspan="4" style="padding-top:6px;opacity:0.7">pixels of the image</td></tr>'
-    return [head, *(row(name, what, f"{100 * sight.pixels[name]:.1f} %") for name, what in PIXELS.items())]
+    return [
+        head,
+        *(row(name, what, f"{100 * sight.pixels[name]:.1f} %") for name, what in PIXELS_IN_WORDS.items()),
+    ]
 
 
 def stages(sight: Sight) -> str:
@@ -81,10 +85,10 @@ def stages(sight: Sight) -> str:
 
 def row(name: str, what: str, count: str, age: str = "") -> str:
     """A row of the legend: colour, meaning, number and age."""
-    r, g, b = (round(255 * part) for part in COLOURS[name])
     return (
         f'<tr data-kind="{name}"><td style="padding-right:6px"><span style="display:inline-block;width:11px;'
-        f'height:11px;border-radius:3px;background:rgb({r},{g},{b})"></span></td><td>{what}</td>'
+        f'height:11px;border-radius:3px;background:{COLOURS[name]};outline:1px solid #BBBBBB"></span></td>'
+        f"<td>{what}</td>"
         f'<td style="text-align:right;padding:0 8px;white-space:nowrap"><b>{count}</b></td>'
         f'<td style="opacity:0.8;white-space:nowrap">{age}</td></tr>'
     )

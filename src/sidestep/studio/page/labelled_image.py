@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import PixelLabel
-from sidestep.perception.colours import COLOURS
+from sidestep.perception.colours import label_palette
 
 TINTED = (PixelLabel.arm, PixelLabel.edge, PixelLabel.explained, PixelLabel.left_out, PixelLabel.outside)
 SOLID = (
@@ -30,9 +30,10 @@ def labelled_image(depth: npt.NDArray[np.floating], labels: Bytes) -> Bytes:
     share = np.clip((z - near) / max(float(far - near), 1e-6), 0.0, 1.0)
     grey = NEAR_END + (FAR_END - NEAR_END) * share
     picture = np.repeat(grey[..., None], 3, axis=2)
+    palette = label_palette().astype(np.float32) / 255.0
     for label in TINTED:
         mask = labels == int(label.value)
-        tint = np.array(COLOURS[label.name], dtype=np.float32)
+        tint = palette[int(label.value)]
         picture[mask] = tint * (1.0 - SHADING + SHADING * grey[mask][:, None] / NEAR_END)
-    picture[labels == int(PixelLabel.nothing.value)] = COLOURS["nothing"]
+    picture[labels == int(PixelLabel.nothing.value)] = palette[int(PixelLabel.nothing.value)]
     return np.asarray(np.round(255.0 * picture), dtype=np.uint8)

@@ -9,15 +9,13 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep.math.pose import pose_vector
-from sidestep.perception.colours import COLOURS
+from sidestep.perception.colours import CELLS, rgb
 from sidestep.studio.camera_choice import FOCAL, HEIGHT, WIDTH
 from sidestep.studio.page import colours
 from sidestep.studio.sight import KINDS, CameraState, Sight
 
 if TYPE_CHECKING:
     import viser
-
-Rgb = tuple[int, int, int]
 
 FRUSTUM = 0.12  # [m] depth of the camera that is drawn
 EDGE = 2.0 / np.sqrt(
@@ -26,12 +24,6 @@ EDGE = 2.0 / np.sqrt(
 MOST = 6000  # cells that are drawn at most: a browser without a graphics card draws them in seconds
 DOT = 0.004  # [m] of a cell where nobody has looked: many, and the scene is behind them
 MOVING_SIZE = 1.15  # of a moving ball over that of the cell it was made of, which it covers
-
-
-def whole(name: str) -> Rgb:
-    """A colour as whole numbers from 0 to 255."""
-    r, g, b = (round(255.0 * part) for part in COLOURS[name])
-    return r, g, b
 
 
 class SightView:
@@ -88,7 +80,7 @@ class SightView:
             for name, count in zip(KINDS, np.bincount(sight.kinds, minlength=len(KINDS)), strict=True)
         }
         step = max(1, -(-len(sight.kinds) // MOST))
-        palette = np.array([colours.batched(whole(name)) for name in KINDS], dtype=np.uint8)
+        palette = np.array([colours.batched(rgb(CELLS[name])) for name in KINDS], dtype=np.uint8)
         self._batch(
             "cells",
             self._box,
@@ -105,7 +97,7 @@ class SightView:
         self._parts["unseen"] = self._server.scene.add_point_cloud(
             "/sight/unseen",
             sight.unseen,
-            whole("unseen"),
+            rgb(CELLS["unseen"]),
             point_size=DOT,
             point_shape="circle",
             precision="float32",
@@ -118,7 +110,7 @@ class SightView:
             self._ball,
             state.moving[:, :3].astype(np.float32),
             (MOVING_SIZE * state.moving[:, 3]).astype(np.float32),
-            np.array(colours.batched(whole("moving")), dtype=np.uint8),
+            np.array(colours.batched(rgb(CELLS["moving"])), dtype=np.uint8),
         )
 
     def _batch(
