@@ -20,6 +20,7 @@ from sidestep.report import write_report
 from sidestep.scenario import Scenario
 from sidestep.scenario.runner import run_scenario
 from sidestep.studio import messages as m
+from sidestep.studio.camera_choice import HAND, CameraChoice, camera_at
 from sidestep.studio.gallery import GALLERY
 from sidestep.studio.headless import (
     CLOSE_NOTICE,
@@ -41,12 +42,14 @@ SMALL, LARGE = Window(1280, 800), Window(1920, 1080)
 PLANAR = Path(__file__).parents[1] / "examples" / "planar3.urdf"
 ADVANCED = ("Method", "Show", "Scenario")  # tabs inside of this tab
 READY, PATIENCE = 600.0, 120.0  # [s] at most
+CAMERA_IMAGES, CAMERA_MOMENT = 8, 2.0  # and [s], after which a picture of a camera shows what is hidden
+FARTHER = 1.6  # times as far away as the window opens
 MOMENT = 0.8  # [s] of simulated time at which the arm is on its way
 NUM_THINGS = len(starting_scenario().obstacles)
 DROPPED = (
     "([text, name]) => { const all = new DataTransfer(); all.items.add(new File([text], name)); return all; }"
 )
-TABS = ("Start", "Goal", "Obstacles", "Compare", *ADVANCED)
+TABS = ("Start", "Goal", "Obstacles", "Camera", "Compare", *ADVANCED)
 
 
 class Photographer:
@@ -192,6 +195,38 @@ def curved_space(camera: Photographer) -> None:
         camera.keep(studio, page, "advanced-curved-space")
 
 
+def depth_camera(camera: Photographer) -> None:
+    """A depth camera: in front, on the hand, and where space that nobody has seen is closed."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        choose(page, "Camera")
+        for client in studio.server.get_clients().values():  # farther away, where the camera is in the window
+            target = np.array(client.camera.look_at)
+            client.camera.position = target + FARTHER * (np.array(client.camera.position) - target)
+        robot = studio.view.loop.robot
+        for name, place, free in (
+            ("", "front left", True),
+            ("-hand", HAND, True),
+            ("-closed", "above", False),
+        ):
+            pose, link = camera_at(place, robot)
+            studio.send(
+                m.SetCamera(CameraChoice(pose, link, place, rate=5.0, unseen_is_free=free, only=True))
+            )
+            studio.send(m.Restart())
+            until(lambda place=place: shows(studio, place), "its images")  # type: ignore[misc]
+            studio.send(m.SetRunning(False))
+            clock.sleep(1.0)
+            camera.keep(studio, page, f"depth-camera{name}")
+
+
+def shows(studio: Studio, place: str) -> bool:
+    """Whether there are images of a camera at this place, and enough of them."""
+    state = None if studio.snapshot is None else studio.snapshot.camera
+    if state is None or state.choice is None or state.sight is None or state.choice.place != place:
+        return False
+    return state.sight.time > CAMERA_MOMENT and state.sight.number > CAMERA_IMAGES
+
+
 def own_robot(camera: Photographer) -> None:
     """A robot of a file that is dropped on the page, with its draft body: URDF and MJCF."""
     mujoco.mj_saveLastXML(str(camera.folder / "planar3.xml"), mujoco.MjModel.from_xml_path(str(PLANAR)))
@@ -231,7 +266,19 @@ def report(camera: Photographer) -> None:
 
 MAKERS = {
     maker.__name__.replace("_", "-"): maker
-    for maker in (opening, tabs, gallery, comparison, goals, obstacles, curved_space, own_robot, show, report)
+    for maker in (
+        opening,
+        tabs,
+        gallery,
+        comparison,
+        goals,
+        obstacles,
+        curved_space,
+        depth_camera,
+        own_robot,
+        show,
+        report,
+    )
 }
 
 

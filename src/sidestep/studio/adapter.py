@@ -101,6 +101,21 @@ class ControllerAdapter:
         self._told: Obstacles | None = None
         self._said: Controller | None = None  # took the last step
         self._seen, self._q = Obstacles.none(), np.array(robot.neutral)  # of that step
+        self._scene_is_known, self._has_camera = True, False
+
+    @property
+    def controller(self) -> Controller:
+        """That which moves the arm."""
+        return self._controller
+
+    @property
+    def time(self) -> float:
+        """Of its last step, on its clock [s]."""
+        return self._time
+
+    def set_known(self, *, scene: bool, camera: bool) -> None:
+        """What the controller is told of: the scene, or only what a camera sees; and whether there is a camera."""
+        self._scene_is_known, self._has_camera = scene, camera
 
     def set_arm(self, arm: Arm) -> None:
         """Another body for the same joints, as a finer one; the controller goes on."""
@@ -125,7 +140,7 @@ class ControllerAdapter:
         """The torque (nv,) [Nm | N] of one period."""
         if self._told is not None:
             self._told.advance(self._settings.period)
-        if self._told is None or not alike(self._told, obstacles):
+        if self._scene_is_known and (self._told is None or not alike(self._told, obstacles)):
             self._controller.set_obstacles(obstacles, valid_for=math.inf)  # they are where the page has them
             self._told = obstacles
         self._said, self._seen, self._q = self._controller, obstacles, q
@@ -137,6 +152,8 @@ class ControllerAdapter:
         settings = copy.copy(self._settings)
         settings.synchronous = True
         settings.planner = settings.look_ahead = settings.local_minimum = None
+        if self._has_camera:
+            obstacles = self._controller.obstacles if self._time else Obstacles.none()
         self._said = Controller(self._arm, settings)
         self._said.set_goal(self._goal)
         self._said.set_obstacles(obstacles, valid_for=math.inf)
@@ -178,15 +195,20 @@ class ControllerAdapter:
             step.values,
             step.metric,
             self._said.activations,
-            reason_of(self._said, self._seen, self._q),
+            reason_of(self._said, self._obstacles, self._q),
         )
+
+    @property
+    def _obstacles(self) -> Obstacles:
+        """That the last step saw."""
+        return self._said.obstacles if self._has_camera and self._said is not None else self._seen
 
     def event_record(self) -> EventRecord | None:
         """What events are told of, of the last step; None before one."""
         if self._said is None:
             return None
         command = self._said.command
-        link, obstacle, _ = binding(self._said, self._seen)
+        link, obstacle, _ = binding(self._said, self._obstacles)
         limit = limit_in_words(command.limits, self._robot.coordinate_names)
         return EventRecord(
             command.activity, command.avoiding, self._said.searches, link, obstacle, command.status, limit

@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from sidestep.scenario import Scenario
 from sidestep.simulation.pose_target import IkSolution
+from sidestep.studio.camera_choice import CameraChoice
 from sidestep.studio.parameters import Numbers
 from sidestep.studio.reason import Reason
 from sidestep.studio.scene_obstacle import SceneObstacle
+from sidestep.studio.sight import CameraState
 
 Array = npt.NDArray[np.float64]
 Course = Literal["file", "held", "left"]
@@ -128,6 +130,13 @@ class VisitGoals:
     goals: tuple[Array, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class SetCamera:
+    """Switches the depth camera on, or changes it; None: off."""
+
+    choice: CameraChoice | None
+
+
 @dataclass(frozen=True)
 class Seen:
     """The page has taken a snapshot: it may have another."""
@@ -155,6 +164,7 @@ Command: TypeAlias = (
     | Restart
     | Load
     | VisitGoals
+    | SetCamera
     | Seen
     | Drawn
 )
@@ -198,7 +208,7 @@ class Snapshot:
         events: what happened last, oldest first: simulated time [s] and words.
         torque_share, speed_share: largest of a joint over its limit.
         contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
-        timing: of the steps. rows: of a recording since the last snapshot.
+        timing: of the steps. rows: of a recording since the last snapshot. camera: what a depth camera sees.
     """
 
     scenario: Scenario
@@ -236,6 +246,7 @@ class Snapshot:
     touched: int
     timing: Timing
     recording: bool
+    camera: CameraState
     rows: tuple[Row, ...] = ()
 
 

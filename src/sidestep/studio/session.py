@@ -9,7 +9,7 @@ import re
 import time as clock
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,9 @@ from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
 from sidestep.studio.adapter import Adapter, ControllerAdapter, StepRecord
+from sidestep.studio.aim import Aim
+from sidestep.studio.camera_choice import CameraChoice
+from sidestep.studio.camera_process import Setup
 from sidestep.studio.goals_in_turn import GoalsInTurn
 from sidestep.studio.methods import METHODS, check_numbers, method_named
 from sidestep.studio.parameters import Method, Numbers
@@ -28,6 +31,7 @@ from sidestep.studio.prepared_bodies import USUAL, Draft, Prepare, PreparedBodie
 from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.seen_things import SeenThings
+from sidestep.studio.session_camera import SessionCamera
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
 from sidestep.studio.steps import Steps
 from sidestep.studio.systems import build_adapter, numbers_of, recipe_of
@@ -37,17 +41,6 @@ Array = npt.NDArray[np.float64]
 
 LOOK_EVERY = 10  # steps between two looks for events
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
-
-
-class Aim(NamedTuple):
-    """Where the arm is to go: a pose (4, 4) or None, and the configuration, or one near that of the pose.
-
-    written: as the scenario says.
-    """
-
-    pose: Array | None
-    near: Array
-    written: bool
 
 
 class Session:
@@ -102,6 +95,7 @@ class Session:
         self._turns = GoalsInTurn()
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
+        self._camera = SessionCamera(self._camera_setup, synchronous=synchronous)
         self.edition = 0
         self._rows = []
         self._load(scenario, self._method, numbers or {}, goals)
@@ -166,6 +160,9 @@ class Session:
                 self._load(scenario, self._method if asked is None else method_named(asked), {}, goals)
             case m.VisitGoals(goals):
                 self._visit(goals)
+            case m.SetCamera(choice):
+                self._camera.set(choice, self._adapter)
+                self._use(self._method, self._numbers[self._method.name])
             case m.Seen() | m.Drawn():
                 return
         if not self.running:
@@ -181,6 +178,8 @@ class Session:
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
         self._steps.torque = self._adapter.step(q, v, *stage.dynamics(), self._obstacles())
+        if not self._camera.step(self._adapter, q, self._poses):
+            self._use(self._method, self._numbers[self._method.name])
         finite = stage.end(self._steps.torque)
         self._steps.times.append(clock.perf_counter() - begin)
         if not finite:
@@ -236,6 +235,7 @@ class Session:
             touched=self._steps.touched,
             timing=m.Timing.of(self._steps.times, real_time),
             recording=self._recording,
+            camera=self._camera.state(self._adapter),
             rows=rows,
         )
 
@@ -281,6 +281,7 @@ class Session:
         self._goal = self._loaded_goal = Aim(pose, near, written=True)
         if self.edition and robot is not self.robot:
             self.stop()
+        self._camera.tell(adapter)
         self.scenario, self.robot, self.stage = scenario, robot, stage
         self._method, self._numbers, self._prepared = method, numbers, prepared
         self.period = scenario.simulation.period
@@ -333,6 +334,7 @@ class Session:
     def _set_actors(self, actors: list[MovableObstacle]) -> None:
         self.stage.set_things(actors)
         self.edition += 1
+        self._camera.renew()
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
@@ -341,6 +343,7 @@ class Session:
         if goal.pose is not None and found is not None and found.found:
             goal = goal._replace(near=found.q)
         adapter.set_goal(goal.pose, goal.near, thorough=True)
+        self._camera.tell(adapter)
         self._adapter, self._method, self._numbers[method.name] = adapter, method, dict(numbers)
         self._goal = goal
         self._look()
@@ -355,6 +358,9 @@ class Session:
     ) -> Adapter:
         body, arm = prepared.get(recipe_of(method, numbers, scenario), scenario, robot)
         return build_adapter(method, robot, body, numbers, scenario, arm=arm, synchronous=self._synchronous)
+
+    def _camera_setup(self, choice: CameraChoice) -> Setup:
+        return Setup(self.scenario, tuple(actor.thing for actor in self.stage.actors), choice)
 
     def _take_finer(self) -> None:
         """Lets a finer body be made, and takes it over when it is there."""
@@ -373,6 +379,7 @@ class Session:
     def stop(self) -> None:
         """Ends what runs beside the loop."""
         self._prepared.stop()
+        self._camera.stop()
 
     def _look(self) -> None:
         things = [actor.thing for actor in self.stage.actors]

@@ -8,15 +8,13 @@ from __future__ import annotations
 import contextlib
 import gc
 import logging
-import os
-import secrets
 import subprocess
 import sys
 import threading
 import time as clock
 from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Client, Connection, Listener
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -30,6 +28,7 @@ from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.prepared_bodies import in_words
+from sidestep.studio.process_link import connect_to_parent, start_process
 from sidestep.studio.session import Session
 from sidestep.studio.systems import Covering, Recipe, draft_arm, make_body
 
@@ -43,6 +42,7 @@ BEHIND = (
 )
 LONGEST_HOLD = 10.0  # [s] for which a scenario that was loaded waits for a page; there may be none
 LEAST_WAIT = 2e-4  # [s] shorter waits are not worth a system call
+SWITCH = 2e-4  # [s] for which another thread of the process, as that of a camera, may hold the loop up
 
 
 @dataclass(frozen=True)
@@ -67,21 +67,7 @@ class SessionProcess:
     """
 
     def __init__(self, beginning: Beginning) -> None:
-        key = secrets.token_bytes(32)
-        listener = Listener(authkey=key)
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        address = listener.address
-        assert isinstance(address, str)
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "sidestep.studio.session_process", address],
-            stdin=subprocess.PIPE,
-            env=environment,
-        )
-        assert self._process.stdin is not None
-        self._process.stdin.write(key.hex().encode() + b"\n")
-        self._process.stdin.flush()
-        self._connection = _accept(listener, self._process)
-        listener.close()
+        self._process, self._connection = start_process(__name__)
         self._fresh = threading.Condition()
         self._snapshot: m.Snapshot | None = None
         self._notes: list[m.Preparing | m.Failed] = []
@@ -149,25 +135,6 @@ class SessionProcess:
         with self._fresh:
             self.ended = True
             self._fresh.notify_all()
-
-
-def _accept(listener: Listener, process: subprocess.Popen[bytes]) -> Connection[Any, Any]:
-    """The connection of the process; it is asked for in a thread, so that a process that dies is noticed."""
-    accepted: list[Connection[Any, Any]] = []
-
-    def accept() -> None:
-        with contextlib.suppress(OSError, EOFError):
-            accepted.append(listener.accept())
-
-    thread = threading.Thread(target=accept, daemon=True)
-    thread.start()
-    while thread.is_alive():
-        thread.join(0.1)
-        if process.poll() is not None and not accepted:
-            raise RuntimeError(f"the process of the loop ended with exit code {process.returncode}")
-    if not accepted:
-        raise RuntimeError("the process of the loop did not connect")
-    return accepted[0]
 
 
 def serve(connection: Connection[Any, Any]) -> None:
@@ -311,9 +278,9 @@ class _Pacer:
 
 def main() -> None:
     """Entry point of the process."""
-    key = bytes.fromhex(sys.stdin.readline().strip())
+    sys.setswitchinterval(SWITCH)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
-        serve(Client(sys.argv[1], authkey=key))
+        serve(connect_to_parent())
 
 
 if __name__ == "__main__":

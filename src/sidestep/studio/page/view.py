@@ -18,6 +18,7 @@ from sidestep.scenario.assembly import load_robot
 from sidestep.studio import messages as m
 from sidestep.studio.methods import method_named
 from sidestep.studio.page.arm import ArmView, BodyView, link_meshes
+from sidestep.studio.page.camera_panel import CameraPanel
 from sidestep.studio.page.cameras import Cameras
 from sidestep.studio.page.clearances import Clearances
 from sidestep.studio.page.compare_panel import ComparePanel
@@ -32,6 +33,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.scene import set_up_scene
 from sidestep.studio.page.show_panel import ShowPanel
+from sidestep.studio.page.sight_view import SightView
 from sidestep.studio.page.start_panel import StartPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
@@ -77,6 +79,7 @@ class View:
         self.start_panel.add_mouse(server)
         self.obstacles = ObstacleViews(server, self.loop.send, self.obstacle_panel.select)
         self.surface = Surface(server, self._lock, self.loop.report)
+        self.sight = SightView(server)
         self._set_robot(scenario, robot)
 
     def _add_tabs(self) -> None:
@@ -87,6 +90,8 @@ class View:
         self._goal_tab = tabs.add_tab("Goal")
         with tabs.add_tab("Obstacles"):
             self.obstacle_panel = ObstaclePanel(server, self.loop, lambda: self.goal)
+        with tabs.add_tab("Camera"):
+            self.camera_panel = CameraPanel(server, self.loop)
         with tabs.add_tab("Compare"):
             self.compare = ComparePanel(server, self.loop)
         with tabs.add_tab("Advanced"):
@@ -115,6 +120,8 @@ class View:
             self.tuning.show(snapshot)
             self.start_panel.show(snapshot)
             self.compare.show(snapshot, self.clearances.least)
+            self.camera_panel.show(snapshot)
+            self.sight.show(snapshot.camera, visible=index is None)
             self.recorder.show(snapshot.recording)
             self.obstacle_panel.follow(snapshot)
             now = clock.monotonic()

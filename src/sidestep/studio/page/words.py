@@ -6,7 +6,8 @@ import html
 
 WORDS_HEIGHT = 236  # [px] at least, what the longest words usually take: what is below them stays where it is
 STYLE = (
-    "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
+    "<style>.mantine-Slider-markLabel{translate:0 3px}"  # else a slider's knob covers its least value
+    "[role=tab]{padding-inline:5px !important}</style>"  # six tabs in one row
 )
 
 
