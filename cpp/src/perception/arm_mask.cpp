@@ -17,11 +17,13 @@ constexpr double core_share = 0.5;      // Semi-axes of an ellipsoid's core, as 
 constexpr int core_stride = 4;          // Every how many pixels rays through cores are looked at, in both directions.
 constexpr float no_front = std::numeric_limits<float>::infinity();
 
-/// The displacement of the farthest point of an ellipsoid between two states [m], at most.
-double displacement(const BodyEllipsoid& ellipsoid, const KinematicState& from, const KinematicState& to) noexcept {
-  const KinematicState::Link &a = link_or_world(from, ellipsoid.joint), &b = link_or_world(to, ellipsoid.joint);
-  const Eigen::Vector3d moved = (b.R_WL - a.R_WL) * ellipsoid.mean + b.p_WL - a.p_WL;
-  return moved.norm() + ellipsoid.extent * (b.R_WL - a.R_WL).norm() / std::sqrt(2.0);
+/// The displacement of the farthest point of an ellipsoid in the camera's frame between two times [m], at most.
+double displacement(const BodyEllipsoid& ellipsoid, const ArmInView& from, const ArmInView& to) noexcept {
+  const KinematicState::Link &a = link_or_world(from.arm, ellipsoid.joint), &b = link_or_world(to.arm, ellipsoid.joint);
+  const Eigen::Matrix3d Ra = from.X_WC.linear().transpose() * a.R_WL, Rb = to.X_WC.linear().transpose() * b.R_WL;
+  const Eigen::Vector3d pa = from.X_WC.linear().transpose() * (a.p_WL - from.X_WC.translation());
+  const Eigen::Vector3d pb = to.X_WC.linear().transpose() * (b.p_WL - to.X_WC.translation());
+  return ((Rb - Ra) * ellipsoid.mean + pb - pa).norm() + ellipsoid.extent * (Rb - Ra).norm() / std::sqrt(2.0);
 }
 
 }  // namespace
@@ -64,28 +66,28 @@ ArmMask::Seen ArmMask::see(const Eigen::Vector3d& centre, const Eigen::Matrix3d&
   return seen;
 }
 
-double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const Eigen::Isometry3d& X_WC,
-                          const ArmStates& arm) const noexcept {
-  const KinematicState::Link& link = link_or_world(*arm.now, ellipsoid.joint);
-  const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - X_WC.translation()).norm();
-  const double moved = std::max(displacement(ellipsoid, *arm.before, *arm.now), displacement(ellipsoid, *arm.now, *arm.after));
+double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const ArmInView& before,
+                          const ArmInView& now, const ArmInView& after) noexcept {
+  const KinematicState::Link& link = link_or_world(now.arm, ellipsoid.joint);
+  const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - now.X_WC.translation()).norm();
+  const double moved = std::max(displacement(ellipsoid, before, now), displacement(ellipsoid, now, after));
   return camera.translation_error + camera.rotation_error * distance +
          pixels_at_edge * distance / std::min(camera.fx, camera.fy) + moved;
 }
 
-void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const Eigen::Isometry3d& X_WC, const ArmStates& arm,
-                   DepthImage& image) noexcept {
+void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const ArmInView& before, const ArmInView& now,
+                   const ArmInView& after, DepthImage& image) noexcept {
   front_.assign(image.size(), no_front);
   arm_.assign(image.size(), 0.0f);
   cores_.clear();
-  const Eigen::Isometry3d X_CW = X_WC.inverse();
+  const Eigen::Isometry3d X_CW = now.X_WC.inverse();
   for (std::size_t k = 0; k < ellipsoids_.size(); ++k) {
     const BodyEllipsoid& ellipsoid = ellipsoids_[k];
-    const KinematicState::Link& link = link_or_world(*arm.now, ellipsoid.joint);
+    const KinematicState::Link& link = link_or_world(now.arm, ellipsoid.joint);
     const Eigen::Vector3d centre = X_CW * (link.R_WL * ellipsoid.mean + link.p_WL);
     const Eigen::Matrix3d R = X_CW.linear() * link.R_WL;
     const Eigen::Matrix3d shape = R * ellipsoid.shape * R.transpose();
-    const double growth = growth_[k] = growth_of(ellipsoid, camera, X_WC, arm);
+    const double growth = growth_[k] = growth_of(ellipsoid, camera, before, now, after);
     const double mean_axis = std::sqrt(shape.trace() / 3.0);
     const Eigen::Matrix3d grown =
         (1.0 + growth / mean_axis) * shape + (growth + mean_axis) * growth * Eigen::Matrix3d::Identity();

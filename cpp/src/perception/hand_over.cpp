@@ -124,8 +124,8 @@ void Perception::Impl::refresh_arm() {
   }
 }
 
-Eigen::Isometry3d Perception::Impl::pose_of(const View& view) const {
-  return view.frame_of_arm < 0 ? view.camera.pose : frame_pose(arm->robot(), now, view.frame_of_arm) * view.camera.pose;
+Eigen::Isometry3d Perception::Impl::pose_of(const View& view, const KinematicState& state) const {
+  return view.frame_of_arm < 0 ? view.camera.pose : frame_pose(arm->robot(), state, view.frame_of_arm) * view.camera.pose;
 }
 
 void Perception::Impl::add_unseen(const SeenImage& seen) {
@@ -233,7 +233,9 @@ Obstacles Perception::Impl::moving_balls(View& view, double time) {
       found.velocities.col(n).setZero();
       found.uncertainty[n] = std::max(found.uncertainty[n], speed);
     }
-    velocities[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])] = found.velocities.col(n).cast<float>();
+    const int index = shown[static_cast<std::size_t>(n)];
+    velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
+    map.set_moves(index, found.velocities.col(n).squaredNorm() > 0.0);
   }
   return balls.moving(std::move(found.velocities), std::move(found.uncertainty));
 }

@@ -53,7 +53,7 @@ struct Perception::Impl {
   /// Takes over the arm of the controller, with what it holds.
   void refresh_arm();
   bool find_arm(const View& view, double time, const Eigen::VectorXd& q, PerceptionReport& report);
-  Eigen::Isometry3d pose_of(const View& view) const;
+  Eigen::Isometry3d pose_of(const View& view, const KinematicState& state) const;
   void add_unseen(const SeenImage& seen);
   void judge(View& view, PerceptionReport& report) const;
   /// Gives the controller what the camera shows, and what no camera shows now.

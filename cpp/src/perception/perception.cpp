@@ -90,8 +90,11 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
         "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
     return report;
   }
-  const Eigen::Isometry3d X_WC = capture.pose.value_or(pose_of(view));
-  view.mask.mark(view.camera, view.rays, X_WC, {&before, &now, &after}, view.image);
+  const auto placed = [&](const KinematicState& state) {
+    return ArmInView{state, capture.pose.value_or(pose_of(view, state))};
+  };
+  const Eigen::Isometry3d X_WC = placed(now).X_WC;
+  view.mask.mark(view.camera, view.rays, placed(before), placed(now), placed(after), view.image);
   report.mask_time = since(mark);
   const SeenImage seen{view.camera, view.rays, X_WC, view.image, view.mask.front(), static_cast<std::uint8_t>(number), time};
   map.add(seen);

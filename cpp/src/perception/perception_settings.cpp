@@ -16,7 +16,7 @@ const std::vector<Field<PerceptionSettings>>& fields() {
       {"view_margin", &S::view_margin, "m", 0.0, 5.0,
        "Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes."},
       {"memory", &S::memory, "s", 0.0, inf,
-       "Time for which something is kept that was seen and is hidden or out of view now. What was seen for less than a tenth of it is kept for ten times as long as it was seen. Longer keeps more that is gone."},
+       "Time for which something is kept that was seen and is hidden or out of view now. What moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen. Longer keeps more that is gone."},
       {"clear_after", &S::clear_after, "-", 1, 10,
        "Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later."},
       {"least_pixels", &S::least_pixels, "-", 1, 100,

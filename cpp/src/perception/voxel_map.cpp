@@ -10,7 +10,9 @@
 namespace sidestep {
 namespace {
 
-constexpr double kept_per_seen = 10.0;    // Time for which a voxel is kept, in times for which it was seen.
+constexpr double rests_after = 0.1;  // Time for which something must be seen before it is known to rest [s].
+constexpr double kept_per_seen =
+    10.0;  // Time for which something is kept that moved when it was seen, in times for which it was seen.
 constexpr double kept_at_least = 0.3;     // The same, at least [s].
 constexpr float shrinks_by = 0.2f;        // Share of its excess by which a box shrinks from one image to the next.
 constexpr double second_within = 0.5;     // Time within which a second image must show a voxel with few pixels [s].
@@ -221,7 +223,9 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
     return;
   }
   voxel.is_hidden = voxel.is_hidden || what == Sight::hidden;
-  const double kept = std::min(settings_.memory, kept_at_least + kept_per_seen * (voxel.last - voxel.first));
+  const double was_seen = voxel.last - voxel.first;
+  const bool may_move = voxel.moves || was_seen < rests_after;
+  const double kept = may_move ? std::min(settings_.memory, kept_at_least + kept_per_seen * was_seen) : settings_.memory;
   if (seen.time - voxel.last > (voxel.counts ? kept : second_within)) {
     remove(voxel);
   }

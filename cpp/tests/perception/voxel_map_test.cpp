@@ -102,9 +102,12 @@ BOOST_FIXTURE_TEST_CASE(what_is_seen_through_goes_after_two_images, Mapped) {
   BOOST_TEST(near(ball_at, 0.12) == 0);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_is_hidden_is_kept_ten_times_as_long_as_it_was_seen, Mapped) {
+BOOST_FIXTURE_TEST_CASE(what_moved_is_kept_ten_times_as_long_as_it_was_seen, Mapped) {
   for (int n = 0; n < 10; ++n) {
     add(wall_and_ball());  // seen for 0.3 s
+  }
+  for (const int index : map.touched()) {
+    map.set_moves(index, true);
   }
   const int before = near(ball_at, 0.12);
   test::DepthScene hides = wall_and_ball();
@@ -117,6 +120,22 @@ BOOST_FIXTURE_TEST_CASE(what_is_hidden_is_kept_ten_times_as_long_as_it_was_seen,
     add(hides);
   }
   BOOST_TEST(near(ball_at, 0.12) == 0);  // 0.3 s and ten times 0.3 s
+}
+
+BOOST_FIXTURE_TEST_CASE(what_rests_and_is_hidden_is_kept_as_long_as_set, Mapped) {
+  for (int n = 0; n < 5; ++n) {
+    add(wall_and_ball());
+  }
+  const int before = near(ball_at, 0.12);
+  test::DepthScene hides = wall_and_ball();
+  hides.add_sphere({0.9, 0.0, 0.5}, 0.3);
+  add(hides);
+  time = 1.0 + 4.0 / 30.0 + 29.9;  // seen last after 4/30 s
+  add();
+  BOOST_TEST(near(ball_at, 0.12) == before);
+  time = 1.0 + 4.0 / 30.0 + 30.1;
+  add();
+  BOOST_TEST(near(ball_at, 0.12) == 0);
 }
 
 BOOST_FIXTURE_TEST_CASE(the_arm_in_front_hides_too, Mapped) {

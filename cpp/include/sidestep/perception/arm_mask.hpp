@@ -11,11 +11,10 @@
 
 namespace sidestep {
 
-/// An arm at the time of an image, and a little before and after it: by how much the clock of the image may be wrong.
-struct ArmStates {
-  const KinematicState* before;
-  const KinematicState* now;
-  const KinematicState* after;
+/// An arm and a camera at one time.
+struct ArmInView {
+  const KinematicState& arm;
+  Eigen::Isometry3d X_WC;
 };
 
 /// How far what a camera sees is from where the arm should be.
@@ -35,7 +34,7 @@ struct ArmResidual {
 /// The arm in the image: which pixels show its links and what it holds, and from which depth on it hides what is behind.
 ///
 /// Each covering ellipsoid {p : (p - c)ᵀ S⁻¹ (p - c) <= 1} grows by δ, what errors explain at its place:
-///     δ = translation error + rotation error · distance + one pixel + the way that it moves within the clock error,
+///     δ = translation error + rotation error · distance + one pixel + the way that it moves in the camera's frame within the clock error,
 /// to S' = (1 + δ/a) S + (1 + a/δ) δ² I with the mean semi-axis a, which contains all points within δ of it. A ray z (x, y, 1) is inside
 /// where α z² - 2 β z + γ <= 0; a pixel shows the arm where its depth is there, but for three standard deviations of noise along the ray.
 class ArmMask {
@@ -43,9 +42,10 @@ class ArmMask {
   /// Throws std::invalid_argument where the body is not calibrated.
   ArmMask(const Robot& robot, const Body& body);
 
-  /// Marks the pixels of `image` that show the arm, where its camera is at X_WC. No allocation.
-  void mark(const DepthCamera& camera, const CameraRays& rays, const Eigen::Isometry3d& X_WC, const ArmStates& arm,
-            DepthImage& image) noexcept;
+  /// Marks the pixels of `image` that show the arm. `before` and `after`: earlier and later than `now` by as much as the clock of the image may be
+  /// wrong. No allocation.
+  void mark(const DepthCamera& camera, const CameraRays& rays, const ArmInView& before, const ArmInView& now,
+            const ArmInView& after, DepthImage& image) noexcept;
 
   /// Depth of the nearest surface of the grown arm [m], per pixel of the last image; infinite where it is not.
   const float* front() const noexcept { return front_.data(); }
@@ -62,8 +62,8 @@ class ArmMask {
     bool holds_camera;
   };
   static Seen see(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, const CameraRays& rays) noexcept;
-  double growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const Eigen::Isometry3d& X_WC,
-                   const ArmStates& arm) const noexcept;
+  static double growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& camera, const ArmInView& before,
+                          const ArmInView& now, const ArmInView& after) noexcept;
   void mark(const Seen& seen, const DepthCamera& camera, const CameraRays& rays, DepthImage& image) noexcept;
   void measure(const Seen& core, const DepthCamera& camera, const CameraRays& rays, const DepthImage& image) noexcept;
 

@@ -27,6 +27,7 @@ struct Voxel {
   std::uint8_t missed_images;         ///< Images since then that saw a surface there, and nothing in the cell.
   std::uint8_t free_images;           ///< Images in a row that saw through it.
   bool counts;                        ///< It is an obstacle; else a second image must show it.
+  bool moves;                         ///< What was in it moved when it was seen last.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 };
 
@@ -51,7 +52,8 @@ struct SeenImage {
 ///
 /// An image adds its points to their cells. Then each cell that it did not show is projected into it: where its depth is behind the
 /// whole cell, the cell was seen through, and after `clear_after` such images in a row it is free. Where something is in front of it, the
-/// arm is, or nothing was seen, it is hidden, and kept for `memory`.
+/// arm is, or nothing was seen, it is hidden, and kept for `memory`; what moved, or was seen for less than 0.1 s, for 0.3 s and ten times as
+/// long as it was seen: it has left most of its cells.
 class VoxelMap {
  public:
   static constexpr double background_after = 1.0;  ///< Time for which a voxel must have been seen to be background [s].
@@ -78,6 +80,8 @@ class VoxelMap {
   int num_outside() const noexcept { return num_outside_; }
   /// Indices of the voxels that the last image showed.
   const std::vector<int>& touched() const noexcept { return touched_; }
+  /// Tells whether what is in a voxel moves: then it is kept for less.
+  void set_moves(int index, bool moves) noexcept { voxels_[static_cast<std::size_t>(index)].moves = moves; }
   void clear() noexcept;
 
  private:
