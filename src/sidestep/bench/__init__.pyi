@@ -1,3 +1,10 @@
+from .camera_mask import CameraMaskSettings as CameraMaskSettings
+from .camera_mask import ghost_table as ghost_table
+from .camera_mask import mask_table as mask_table
+from .camera_mask import run_camera_mask as run_camera_mask
+from .camera_recording import CameraRecordingSettings as CameraRecordingSettings
+from .camera_recording import recording_table as recording_table
+from .camera_recording import run_camera_recording as run_camera_recording
 from .campaign import parse_shard as parse_shard
 from .campaign import run_campaign as run_campaign
 from .cloud_size import CloudSizeSettings as CloudSizeSettings

@@ -56,8 +56,10 @@ def drives(
     """
     from sidestep.bench import DriveSettings, drive_table, run_drives
 
-    settings = DriveSettings(**_given(robots=robot), torque=torque, moving=moving, count=count, seed=seed)
-    rows = _rows("drives", run_drives, settings, file, shard, jobs, json, quiet)
+    settings = DriveSettings(
+        **given_options(robots=robot), torque=torque, moving=moving, count=count, seed=seed
+    )
+    rows = campaign_rows("drives", run_drives, settings, file, shard, jobs, json, quiet)
     table = drive_table(rows)
     shown = figures_table(
         "robot", "drives", "contacts", "way out", "speeds [rad/s]", "self", "jerk", "acceleration", "others"
@@ -80,7 +82,7 @@ def drives(
         or any(cell["beyond"][key] for key in ("position", "velocity", "torque", "torque rate"))
         for cell in table.values()
     )
-    _end(shown, {"bench": "drives", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end_with(shown, {"bench": "drives", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def moving(
@@ -116,9 +118,9 @@ def moving(
     for item in told or ():
         if item not in list(Told):
             raise ValueError(f"--told is {item!r}; allowed: {', '.join(Told)}")
-    given = _given(robots=robot, told=[Told(item) for item in told or ()], speeds=speed)
+    given = given_options(robots=robot, told=[Told(item) for item in told or ()], speeds=speed)
     settings = MovingSettings(**given, runs=runs, torque=torque, seed=seed)
-    rows = _rows("moving", run_moving, settings, file, shard, jobs, json, quiet)
+    rows = campaign_rows("moving", run_moving, settings, file, shard, jobs, json, quiet)
     table = moving_table(rows)
     columns = list(dict.fromkeys(name for cells in table.values() for name in cells))
     shown = figures_table("contacts (way out or late)/runs", *table)
@@ -128,7 +130,7 @@ def moving(
             *(_contacts(column, cells[column]) if column in cells else "-" for cells in table.values()),
         )
     bad = not all(is_kept(column, cell) for cells in table.values() for column, cell in cells.items())
-    _end(shown, {"bench": "moving", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end_with(shown, {"bench": "moving", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def faults(
@@ -156,9 +158,9 @@ def faults(
     from sidestep.bench import FaultSettings, fault_table, run_faults
     from sidestep.bench.faults import broken_promises
 
-    given = _given(robots=robot, cases=case)
+    given = given_options(robots=robot, cases=case)
     settings = FaultSettings(**given, runs=runs, torque=not acceleration, seed=seed)
-    rows = _rows("faults", run_faults, settings, file, shard, jobs, json, quiet)
+    rows = campaign_rows("faults", run_faults, settings, file, shard, jobs, json, quiet)
     table = fault_table(rows)
     shown = figures_table("fault", "runs", "hit (silent)", "self", *(title for title, *_ in FAULT_COLUMNS))
     for name, cell in table.items():
@@ -170,7 +172,7 @@ def faults(
             *(_worst(cell[part].get(limit), scale) for _, part, limit, scale in FAULT_COLUMNS),
         )
     bad = any(broken_promises(name, cell) for name, cell in table.items())
-    _end(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end_with(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def _contacts(column: str, cell: Row) -> str:
@@ -184,12 +186,12 @@ def _worst(broken: tuple[int, float] | None, scale: float) -> str:
     return "-" if broken is None else f"{scale * broken[1]:.3g}"
 
 
-def _given(**options: Sequence[Any] | None) -> dict[str, Any]:
+def given_options(**options: Sequence[Any] | None) -> dict[str, Any]:
     """The options that were given; the others have the defaults of the settings."""
     return {name: tuple(values) for name, values in options.items() if values}
 
 
-def _rows(
+def campaign_rows(
     title: str,
     run: Callable[..., list[Row]],
     settings: object,
@@ -209,7 +211,7 @@ def _rows(
     )
 
 
-def _end(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
+def end_with(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
     from sidestep import __version__
     from sidestep.bench.parallel import cpu_name
 
