@@ -1,3 +1,13 @@
+from .camera_clearing import clearing_images as clearing_images
+from .camera_moving import CameraMovingSettings as CameraMovingSettings
+from .camera_moving import Seen as Seen
+from .camera_moving import camera_moving_table as camera_moving_table
+from .camera_moving import run_camera_moving as run_camera_moving
+from .camera_rig import CameraRig as CameraRig
+from .camera_rig import RigSettings as RigSettings
+from .camera_scenes import CameraSceneSettings as CameraSceneSettings
+from .camera_scenes import camera_scene_table as camera_scene_table
+from .camera_scenes import run_camera_scenes as run_camera_scenes
 from .campaign import parse_shard as parse_shard
 from .campaign import run_campaign as run_campaign
 from .cloud_size import CloudSizeSettings as CloudSizeSettings

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.bench_camera_command import camera_moving, camera_scenes
 from sidestep.cli.bench_encounters_command import drives, faults, moving
 from sidestep.cli.bench_output import (
     DurationOption,
@@ -43,6 +44,8 @@ app.command("dynamic")(dynamic)
 app.command("drives")(drives)
 app.command("moving")(moving)
 app.command("faults")(faults)
+app.command("camera-scenes")(camera_scenes)
+app.command("camera-moving")(camera_moving)
 app.command("step")(step)
 app.command("compare")(compare)
 app.command("peers")(peers)

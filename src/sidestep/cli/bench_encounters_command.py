@@ -56,8 +56,8 @@ def drives(
     """
     from sidestep.bench import DriveSettings, drive_table, run_drives
 
-    settings = DriveSettings(**_given(robots=robot), torque=torque, moving=moving, count=count, seed=seed)
-    rows = _rows("drives", run_drives, settings, file, shard, jobs, json, quiet)
+    settings = DriveSettings(**given(robots=robot), torque=torque, moving=moving, count=count, seed=seed)
+    rows = rows_of("drives", run_drives, settings, file, shard, jobs, json, quiet)
     table = drive_table(rows)
     shown = figures_table(
         "robot", "drives", "contacts", "way out", "speeds [rad/s]", "self", "jerk", "acceleration", "others"
@@ -80,7 +80,7 @@ def drives(
         or any(cell["beyond"][key] for key in ("position", "velocity", "torque", "torque rate"))
         for cell in table.values()
     )
-    _end(shown, {"bench": "drives", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end(shown, {"bench": "drives", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def moving(
@@ -116,9 +116,9 @@ def moving(
     for item in told or ():
         if item not in list(Told):
             raise ValueError(f"--told is {item!r}; allowed: {', '.join(Told)}")
-    given = _given(robots=robot, told=[Told(item) for item in told or ()], speeds=speed)
-    settings = MovingSettings(**given, runs=runs, torque=torque, seed=seed)
-    rows = _rows("moving", run_moving, settings, file, shard, jobs, json, quiet)
+    chosen = given(robots=robot, told=[Told(item) for item in told or ()], speeds=speed)
+    settings = MovingSettings(**chosen, runs=runs, torque=torque, seed=seed)
+    rows = rows_of("moving", run_moving, settings, file, shard, jobs, json, quiet)
     table = moving_table(rows)
     columns = list(dict.fromkeys(name for cells in table.values() for name in cells))
     shown = figures_table("contacts (way out or late)/runs", *table)
@@ -128,7 +128,7 @@ def moving(
             *(_contacts(column, cells[column]) if column in cells else "-" for cells in table.values()),
         )
     bad = not all(is_kept(column, cell) for cells in table.values() for column, cell in cells.items())
-    _end(shown, {"bench": "moving", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end(shown, {"bench": "moving", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def faults(
@@ -156,9 +156,9 @@ def faults(
     from sidestep.bench import FaultSettings, fault_table, run_faults
     from sidestep.bench.faults import broken_promises
 
-    given = _given(robots=robot, cases=case)
-    settings = FaultSettings(**given, runs=runs, torque=not acceleration, seed=seed)
-    rows = _rows("faults", run_faults, settings, file, shard, jobs, json, quiet)
+    chosen = given(robots=robot, cases=case)
+    settings = FaultSettings(**chosen, runs=runs, torque=not acceleration, seed=seed)
+    rows = rows_of("faults", run_faults, settings, file, shard, jobs, json, quiet)
     table = fault_table(rows)
     shown = figures_table("fault", "runs", "hit (silent)", "self", *(title for title, *_ in FAULT_COLUMNS))
     for name, cell in table.items():
@@ -170,7 +170,7 @@ def faults(
             *(_worst(cell[part].get(limit), scale) for _, part, limit, scale in FAULT_COLUMNS),
         )
     bad = any(broken_promises(name, cell) for name, cell in table.items())
-    _end(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
+    end(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
 def _contacts(column: str, cell: Row) -> str:
@@ -184,12 +184,12 @@ def _worst(broken: tuple[int, float] | None, scale: float) -> str:
     return "-" if broken is None else f"{scale * broken[1]:.3g}"
 
 
-def _given(**options: Sequence[Any] | None) -> dict[str, Any]:
+def given(**options: Sequence[Any] | None) -> dict[str, Any]:
     """The options that were given; the others have the defaults of the settings."""
     return {name: tuple(values) for name, values in options.items() if values}
 
 
-def _rows(
+def rows_of(
     title: str,
     run: Callable[..., list[Row]],
     settings: object,
@@ -199,6 +199,7 @@ def _rows(
     json: str | None,
     quiet: bool,
 ) -> list[Row]:
+    """The rows of a campaign, run with a bar."""
     from sidestep.bench import default_jobs, parse_shard
 
     part, processes = parse_shard(shard), jobs or default_jobs()
@@ -209,7 +210,8 @@ def _rows(
     )
 
 
-def _end(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
+def end(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
+    """Shows a table, writes the document, and ends the command: 1 where something is bad, else 0."""
     from sidestep import __version__
     from sidestep.bench.parallel import cpu_name
 
