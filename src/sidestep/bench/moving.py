@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -20,11 +20,13 @@ from sidestep.bench.encounters import (
     Encounter,
     EncounterJudge,
     IdealPlant,
+    Tell,
     TorquePlant,
     load_with_meshes,
     run_encounter,
 )
 from sidestep.bench.parallel import Progress
+from sidestep.bench.sensor_fault import SensorFault
 from sidestep.bench.tracker import LATE, LOST, OFF, SEEN_EVERY, After, Told, Tracker
 from sidestep.bench.workspace import Workspace
 from sidestep.distance import ExactClearance, SceneObject, SelfCollision
@@ -32,6 +34,7 @@ from sidestep.obstacles import Capsule, Shape, Sphere, pose_at
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
+Teller = Callable[[SceneObject, SensorFault | None], Tell]
 
 SPEEDS = (0.2, 0.5, 1.0)  # [m/s]
 ALL_COLUMNS = ("fr3", "ur10")  # robots with every cell
@@ -170,8 +173,12 @@ class EncounterMaker:
         self._shoulder = Workspace.of(robot).shoulder
         self._links = [link.name for link in robot.links if robot.collision_mesh(link.name) is not None]
 
-    def make(self, task: MovingTask, *, seed: int) -> Encounter:
+    def make(self, task: MovingTask, *, seed: int, teller: Teller | None = None) -> Encounter:
         """The encounter of a task.
+
+        Args:
+            task, seed: of which it is made.
+            teller: makes what tells of the solid, of the solid and the fault; None: a `Tracker`.
 
         Raises:
             ValueError: none was found among the tries.
@@ -202,13 +209,18 @@ class EncounterMaker:
                 solid = replace(solid, moves_during=(0.0, fault.begins))
                 steps = max(steps, step + round(STANDS / PERIOD))
         tracker = Tracker(solid, task.told, told_velocity, lag, lost, fault)
+        tells = (
+            teller(solid, fault)
+            if teller is not None
+            else lambda controller, step, q: tracker.tell(controller, step)
+        )
 
         def tell(controller: Controller, step: int, q: Array) -> None:
             if step == 0 and task.holds:
                 controller.set_goal(start)
             if not task.holds and step % GOAL_EVERY == 0:
                 controller.set_goal(goals[step // GOAL_EVERY])
-            tracker.tell(controller, step)
+            tells(controller, step, q)
 
         return Encounter(task.run, start, steps, (solid,), tell, fault=fault)
 

@@ -9,6 +9,7 @@ import typer
 
 from sidestep.bench.method import Method
 from sidestep.cli.bench_camera_command import camera_mask, camera_recording
+from sidestep.cli.bench_camera_loop_command import camera_moving, camera_scenes
 from sidestep.cli.bench_encounters_command import drives, faults, moving
 from sidestep.cli.bench_output import (
     DurationOption,
@@ -46,6 +47,8 @@ app.command("moving")(moving)
 app.command("faults")(faults)
 app.command("camera-mask")(camera_mask)
 app.command("camera-recording")(camera_recording)
+app.command("camera-scenes")(camera_scenes)
+app.command("camera-moving")(camera_moving)
 app.command("step")(step)
 app.command("compare")(compare)
 app.command("peers")(peers)
