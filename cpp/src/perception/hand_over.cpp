@@ -16,28 +16,34 @@ constexpr double speed_window = 0.15;    // Time over which a velocity is found,
 constexpr double speed_noise = 2.0;      // Displacement in that time that may be noise of depths, in standard deviations.
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
+constexpr double thin_share = 0.5;       // Size of a box along one axis that is a surface across it, as a share of the others.
+constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
 Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
 Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
-double radius_of(const Voxel& voxel) {
-  return 0.5 * (high_of(voxel) - low_of(voxel)).norm() + static_cast<double>(voxel.error);
-}
+/// A ball that holds the box of a voxel.
+struct BoxBall {
+  Eigen::Vector3d centre;
+  double radius;
+};
 
-Obstacles balls(const std::vector<Voxel>& voxels, const std::vector<int>& chosen) {
-  if (chosen.empty()) {
-    return Obstacles::none();
+/// The ball around a box whose middle is pushed away from the camera by `depth`: it holds the box all the same, and stands out of it less on
+/// the side that is seen, by sqrt(h² + depth²) - depth in place of h for a box with the half diagonal h in that plane.
+///
+/// A box that is thin along an axis holds a surface across that axis, and is pushed along it; another one along the ray.
+BoxBall ball_behind(const Eigen::Vector3d& middle, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                    const Eigen::Vector3d& eye, double depth) {
+  const Eigen::Vector3d size = high - low, ray = (middle - eye).normalized();
+  Eigen::Index axis = 0;
+  const double thin = size.minCoeff(&axis);
+  Eigen::Vector3d away = ray;
+  if (thin < thin_share * (size.sum() - thin) / 2.0) {
+    away = Eigen::Vector3d::Unit(axis) * (ray[axis] < 0.0 ? -1.0 : 1.0);
   }
-  const auto num = static_cast<Eigen::Index>(chosen.size());
-  Eigen::Matrix3Xd points(3, num);
-  Eigen::VectorXd radii(num);
-  for (Eigen::Index n = 0; n < num; ++n) {
-    const Voxel& voxel = voxels[static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)])];
-    points.col(n) = centre_of(voxel);
-    radii[n] = radius_of(voxel);
-  }
-  return Obstacles(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+  const Eigen::Vector3d centre = middle + depth * away;
+  return {centre, (centre - low).cwiseMax(high - centre).norm()};
 }
 
 /// The farthest that an ellipsoid of an arm can be from the arm's base, whatever its joints do [m].
@@ -208,23 +214,32 @@ void Perception::Impl::tell(const std::string& source, Obstacles obstacles, cons
   controller.set_obstacles(std::move(obstacles), options);
 }
 
+Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) const {
+  if (chosen.empty()) {
+    return Obstacles::none();
+  }
+  const auto num = static_cast<Eigen::Index>(chosen.size());
+  Eigen::Matrix3Xd points(3, num);
+  Eigen::VectorXd radii(num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)])];
+    // The middle of what the last image shows moves with it; the ball holds what images before have shown, too.
+    const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
+    const BoxBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
+                                     views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
+    points.col(n) = ball.centre;
+    radii[n] = ball.radius + static_cast<double>(voxel.error);
+  }
+  return Obstacles(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+}
+
 Obstacles Perception::Impl::moving_balls(View& view, double time) {
-  const std::vector<Voxel>& voxels = map.voxels();
   if (shown.empty()) {
     view.motion.forget();
     return Obstacles::none();
   }
-  const auto num = static_cast<Eigen::Index>(shown.size());
-  Eigen::Matrix3Xd points(3, num);
-  Eigen::VectorXd radii(num);
-  for (Eigen::Index n = 0; n < num; ++n) {
-    // The middle of what this image shows moves with it; the ball around it holds what images before have shown, too.
-    const Voxel& voxel = voxels[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])];
-    const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
-    points.col(n) = middle;
-    radii[n] = (middle - low_of(voxel)).cwiseMax(high_of(voxel) - middle).norm() + static_cast<double>(voxel.error);
-  }
-  Obstacles balls(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+  const Eigen::Index num = static_cast<Eigen::Index>(shown.size());
+  Obstacles balls = this->balls(shown, true);
   VelocityEstimate::Result found = view.motion.update(balls, time);
   for (Eigen::Index n = 0; n < num; ++n) {
     const double depth = (balls.points().col(n) - view.X_WC.translation()).norm();
@@ -269,7 +284,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     }
   }
   if (remembered != last_remembered) {  // boxes of what is not seen do not change
-    tell(memory_source, balls(voxels, remembered), {memory_source, SourceOptions::untold, ever, false});
+    tell(memory_source, balls(remembered, false), {memory_source, SourceOptions::untold, ever, false});
     last_remembered.swap(remembered);
   }
   View& view = views[number];
@@ -298,9 +313,11 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
     const Voxel& voxel = map.voxels()[n];
     if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0) {
       const bool is_remembered = voxel.shown_by == 0;
+      const BoxBall ball = ball_behind(centre_of(voxel), low_of(voxel), high_of(voxel), views[voxel.camera].X_WC.translation(),
+                                       pushed_back * map.edge(voxel));
       const Eigen::Vector3d velocity = is_remembered ? Eigen::Vector3d::Zero() : Eigen::Vector3d(velocities[n].cast<double>());
-      all.push_back(
-          {centre_of(voxel), radius_of(voxel), voxel.camera, newest - voxel.last, is_remembered, velocity, voxel.is_hidden});
+      all.push_back({ball.centre, ball.radius + static_cast<double>(voxel.error), voxel.camera, newest - voxel.last,
+                     is_remembered, velocity, voxel.is_hidden});
     }
   }
   return all;

@@ -60,6 +60,8 @@ struct Perception::Impl {
   void hand_over(std::size_t number, double time, PerceptionReport& report);
   /// Replaces what a source says. Without obstacles that is believed at once: it comes from images that show something.
   void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
+  /// Balls around these voxels; `moved`: around what the last image alone shows.
+  Obstacles balls(const std::vector<int>& chosen, bool moved) const;
   /// What a camera shows, with velocities.
   Obstacles moving_balls(View& view, double time);
   /// Takes what other sources say, where it was at a time [s].

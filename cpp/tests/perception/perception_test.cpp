@@ -29,6 +29,7 @@ struct Watched {
 
   Watched() {
     camera.translation_error = 0.01;
+    settings.voxel = 0.02;  // a pixel is as large
     scene.floor = -0.3;
     scene.add_sphere({0.2, 0.9, 0.5}, 0.15);
     scene.add_arm(arm.robot(), arm.body(), q);

@@ -19,7 +19,7 @@ struct Mapped {
   CameraRays rays{camera};
   DepthImage image{camera};
   std::vector<float> no_arm = std::vector<float>(160 * 120, std::numeric_limits<float>::infinity());
-  PerceptionSettings settings;
+  PerceptionSettings settings = {.voxel = 0.02};  // pixels are 1.2 cm wide
   VoxelMap map{Eigen::Vector3d::Zero(), 1.0, settings};
   double time = 1.0;
   std::vector<float> pixels;
