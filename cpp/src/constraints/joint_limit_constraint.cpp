@@ -31,20 +31,20 @@ void JointLimitConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) 
 }
 
 void JointLimitConstraint::widen(Priority given_up, const Moment& now, Bounds& bounds) const noexcept {
-  if (given_up == Priority::jerk) {
-    widen_to_limits(now, bounds);
-  } else {
+  const bool is_feedback = now.last.torque != nullptr && now.last.acceleration_factor > 1.0;
+  if (given_up != Priority::jerk || (is_feedback && !now.last.yields)) {
     widen_to_overruns(now, bounds);
+  } else if (is_feedback) {
+    bounds.wide.upper = now.last.acceleration_factor * limits_.acceleration;
+    bounds.wide.lower = -bounds.wide.upper;
+  } else {
+    widen_to_limits(bounds);
   }
 }
 
-void JointLimitConstraint::widen_to_limits(const Moment& now, Bounds& bounds) const noexcept {
+void JointLimitConstraint::widen_to_limits(Bounds& bounds) noexcept {
   bounds.wide.lower = bounds.firm_jerk.lower.cwiseMax(bounds.box.lower).cwiseMin(bounds.box.upper);
   bounds.wide.upper = bounds.firm_jerk.upper.cwiseMin(bounds.box.upper).cwiseMax(bounds.box.lower);
-  if (now.last.torque != nullptr && now.last.acceleration_factor > 1.0) {
-    bounds.wide.upper = now.last.acceleration_factor * limits_.acceleration;
-    bounds.wide.lower = -bounds.wide.upper;
-  }
 }
 
 void JointLimitConstraint::widen_to_overruns(const Moment& now, Bounds& bounds) const noexcept {

@@ -129,6 +129,7 @@ ProgramStatus Tracker::track(const Reference& reference, const Arm& arm, double 
     last = near_last(arm.last.acceleration, arm.last.has_torque ? &arm.last.torque : nullptr, arm.dynamics, factor, false);
   }
   last.decided = &reference.a;
+  last.yields = is_impedance();
   const ProgramStatus status =
       program_.solve(arm.q, arm.v, feedback_, arm.dynamics, clearances, {}, last, tick, solution_, arm.speed);
   return status > ProgramStatus::limited ? std::max(decided, status) : decided;

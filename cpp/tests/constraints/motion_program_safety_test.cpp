@@ -97,6 +97,32 @@ BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   BOOST_TEST(solution.safety[0].slack == 0.5 * (asked - 10.0), boost::test_tools::tolerance(1e-9));
 }
 
+BOOST_AUTO_TEST_CASE(feedback_too_leaves_neither_position_limits_nor_overruns_for_a_clearance) {
+  // Feedback may exceed the acceleration limit of 10 /s² twenty times, and the clearance asks for 22 /s². What fits into no
+  // smooth solution must not lead past the position limit, or past 1.2 times the velocity limit of 2.5 /s.
+  MotionProgram controller(test::serial_arm(test::arm_limits(nv)));
+  MotionSolution solution(nv);
+  Approach in;
+  in.clearances.curvatures[1] = -9.0;
+  in.clearances.mind_nearest();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
+  LastCommand last{&rest, &rest, nullptr, nullptr, 20.0, false};
+  const auto solve = [&](double q, double v) {
+    in.q[2] = q;
+    in.v[2] = v;
+    return controller.solve({in.q, in.v, in.a, in.M, in.h, &in.clearances, {}, last}, solution);
+  };
+  BOOST_TEST((solve(0.0, 0.0) <= ProgramStatus::relaxed));
+  BOOST_TEST(solution.acceleration[2] > 20.0);
+  BOOST_TEST((solve(2.48, 0.7) == ProgramStatus::relaxed_safety));  // 10 /s² would need 24.5 of the 20 mrad that are left
+  BOOST_TEST(solution.acceleration[2] < -9.9);
+  BOOST_TEST((solve(0.0, 3.0) == ProgramStatus::relaxed_safety));
+  BOOST_TEST(solution.acceleration[2] < 1e-9);  // rounding
+  last.yields = true;                           // Something may push an impedance faster than that: clearances come first.
+  BOOST_TEST((solve(0.0, 3.0) <= ProgramStatus::relaxed));
+  BOOST_TEST(solution.acceleration[2] > 20.0);
+}
+
 BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot) {
   // Joint 2 cannot give what its clearance asks for; joint 0 can, whatever the task wants: it may change by 2000 /s².
   JointLimits limits = test::arm_limits(nv);

@@ -26,6 +26,9 @@ struct LastCommand {
   bool early = false;
   /// Decision about the clearances before (nv) [/s^2]: they ask for no more; null: none.
   const Eigen::VectorXd* decided = nullptr;
+  /// Whether feedback is an impedance: what pushes the arm may make it faster than every overrun, and clearances stop it all the
+  /// same.
+  bool yields = false;
 };
 
 /// Clearances at a second state, which bound the same acceleration: those of the arm itself if the program is solved for its

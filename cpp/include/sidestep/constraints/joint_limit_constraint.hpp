@@ -20,14 +20,14 @@ class JointLimitConstraint : public Constraint {
   int max_rows() const noexcept override { return 0; }
   void append(const Moment& now, Bounds& bounds, RowBlock& rows) noexcept override;
   bool bounds_stop() const noexcept override { return true; }
-  /// jerk: to the limits themselves, or the feedback's factor times them. comfort: to the overruns, which nothing exceeds.
+  /// jerk: to the limits themselves; of feedback to the overruns, of an impedance to its factor alone. comfort: to the overruns.
   void widen(Priority given_up, const Moment& now, Bounds& bounds) const noexcept override;
   /// Names the jerk limits that gave way.
   void report(const Moment& now, const Bounds& bounds, const RowBlock& rows, const Eigen::VectorXd& wanted,
               MotionSolution& solution) const noexcept override;
 
  private:
-  void widen_to_limits(const Moment& now, Bounds& bounds) const noexcept;
+  static void widen_to_limits(Bounds& bounds) noexcept;
   void widen_to_overruns(const Moment& now, Bounds& bounds) const noexcept;
 
   JointLimits limits_;
