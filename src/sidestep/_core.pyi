@@ -4103,8 +4103,8 @@ class PerceptionSettings:
     """
     How what cameras see becomes obstacles.
 
-        voxel [m], default 0.02, allowed 0.005 to 0.1: Edge of the cells in which points are merged, within reach of the arm. Smaller cells reach out less, by up to 0.87 of the edge, and cost more.
-        reach_margin [m], default 0.25, allowed 0 to 2: Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is 1.5 and 2.5 times as long.
+        voxel [m], default 0.02, allowed 0.005 to 0.1: Edge of the cells in which points are merged, within reach of the arm. Obstacles stand out of surfaces by 0.4 of the edge, and more at edges. Smaller cells stand out less, and cost more.
+        reach_margin [m], default 0.25, allowed 0 to 2: Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is twice and four times as long.
         view_margin [m], default 2.0, allowed 0 to 5: Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes.
         memory [s], default 30.0, allowed 0 to inf: Time for which something is kept that was seen and is hidden or out of view now. What moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen. Longer keeps more that is gone.
         clear_after, default 2, allowed 1 to 10: Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later.

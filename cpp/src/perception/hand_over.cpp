@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "impl.hpp"
 #include "nearby.hpp"
+#include "sidestep/math/random_stream.hpp"
 
 namespace sidestep {
 namespace {
@@ -16,6 +18,8 @@ constexpr double speed_window = 0.15;    // Time over which a velocity is found,
 constexpr double speed_noise = 2.0;      // Displacement in that time that may be noise of depths, in standard deviations.
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
+constexpr int reach_samples = 2000;      // Random configurations of which the reach is taken.
+constexpr double reach_more = 1.05;      // Reach in what these reach.
 constexpr double thin_share = 0.5;       // Size of a box along one axis that is a surface across it, as a share of the others.
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
@@ -23,12 +27,6 @@ constexpr double grown = 0.002;          // Growth of a box since it was compare
 Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
 Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
 Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
-/// A ball that holds the box of a voxel.
-struct BoxBall {
-  Eigen::Vector3d centre;
-  double radius;
-};
-
 /// The ball around a box whose middle is pushed away from the camera by `depth`: it holds the box all the same, and stands out of it less on
 /// the side that is seen, by sqrt(h² + depth²) - depth in place of h for a box with the half diagonal h in that plane.
 ///
@@ -46,31 +44,30 @@ BoxBall ball_behind(const Eigen::Vector3d& middle, const Eigen::Vector3d& low, c
   return {centre, (centre - low).cwiseMax(high - centre).norm()};
 }
 
-/// The farthest that an ellipsoid of an arm can be from the arm's base, whatever its joints do [m].
+/// How far the ellipsoids of an arm get from its first joint [m], about: of random configurations, and a little more. Beyond, cells are coarser.
 double reach_of(const Arm& arm, Eigen::Vector3d& centre) {
   const Robot& robot = arm.robot();
-  std::vector<double> reach(static_cast<std::size_t>(robot.num_joints()), 0.0);
+  const std::vector<BodyEllipsoid> ellipsoids = body_ellipsoids(robot, arm.body(), "perception");
   centre = robot.num_joints() > 0 ? Eigen::Vector3d(robot.joints().front().X_PJ.translation()) : Eigen::Vector3d::Zero();
-  for (int j = 0; j < robot.num_joints(); ++j) {
-    const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];
-    const double before = joint.parent < 0 ? (joint.X_PJ.translation() - centre).norm()
-                                           : reach[static_cast<std::size_t>(joint.parent)] + joint.X_PJ.translation().norm();
-    double slides = 0.0;
-    if (joint.type == JointType::prismatic) {
-      const JointLimits& limits = robot.limits();
-      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
-      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
-      slides = std::max(std::abs(low), std::abs(high));
-    }
-    reach[static_cast<std::size_t>(j)] = before + (std::isfinite(slides) ? slides : 0.0);
-  }
+  KinematicState state(robot);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
+  Eigen::VectorXd q = zero;
+  RandomStream random(0);
   double farthest = 0.0;
-  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, arm.body(), "perception")) {
-    const double base = ellipsoid.joint < 0 ? (ellipsoid.mean - centre).norm()
-                                            : reach[static_cast<std::size_t>(ellipsoid.joint)] + ellipsoid.mean.norm();
-    farthest = std::max(farthest, base + ellipsoid.extent);
+  for (int sample = 0; sample < reach_samples; ++sample) {
+    for (int i = 0; i < robot.num_coordinates(); ++i) {
+      const double low = robot.limits().lower[i], high = robot.limits().upper[i];
+      q[i] = std::isfinite(low) && std::isfinite(high) ? random.uniform(low, high)
+             : robot.is_prismatic(i)                   ? 0.0
+                                                       : random.uniform(-std::numbers::pi, std::numbers::pi);
+    }
+    state.update(robot, q, zero);
+    for (const BodyEllipsoid& ellipsoid : ellipsoids) {
+      const KinematicState::Link& link = link_or_world(state, ellipsoid.joint);
+      farthest = std::max(farthest, (link.R_WL * ellipsoid.mean + link.p_WL - centre).norm() + ellipsoid.extent);
+    }
   }
-  return farthest;
+  return reach_more * farthest;
 }
 
 VoxelMap make_map(const Arm& arm, const PerceptionSettings& settings) {
@@ -214,45 +211,73 @@ void Perception::Impl::tell(const std::string& source, Obstacles obstacles, cons
   controller.set_obstacles(std::move(obstacles), options);
 }
 
+BoxBall Perception::Impl::ball_of(const Voxel& voxel, bool moved) const {
+  // The middle of what the last image shows moves with it; the ball holds what images before have shown, too.
+  const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
+  BoxBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
+                             views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
+  ball.radius += static_cast<double>(voxel.error);
+  return ball;
+}
+
 Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) const {
   if (chosen.empty()) {
     return Obstacles::none();
   }
   const auto num = static_cast<Eigen::Index>(chosen.size());
-  Eigen::Matrix3Xd points(3, num);
+  Eigen::Matrix3Xd points(3, num), speeds = Eigen::Matrix3Xd::Zero(3, num);
   Eigen::VectorXd radii(num);
   for (Eigen::Index n = 0; n < num; ++n) {
-    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)])];
-    // The middle of what the last image shows moves with it; the ball holds what images before have shown, too.
-    const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
-    const BoxBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
-                                     views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
+    const auto index = static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)]);
+    const BoxBall ball = ball_of(map.voxels()[index], moved);
     points.col(n) = ball.centre;
-    radii[n] = ball.radius + static_cast<double>(voxel.error);
+    radii[n] = ball.radius;
+    if (moved) {
+      speeds.col(n) = velocities[index].cast<double>();
+    }
   }
-  return Obstacles(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
+  return Obstacles(std::move(points), std::move(radii), std::move(speeds));
+}
+
+void Perception::Impl::find_velocities(View& view, double time) {
+  fresh.clear();
+  for (const int index : shown) {
+    const auto n = static_cast<std::size_t>(index);
+    velocities[n].setZero();
+    uncertainties[n] = 0.0f;
+    map.set_moves(index, false);
+    const Voxel& voxel = map.voxels()[n];
+    // What the first image shows may rest; what moves comes to other cells.
+    if (voxel.first > view.begin && !map.is_settled(voxel, view.X_WC.translation(), view.camera.noise)) {
+      fresh.push_back(index);
+    }
+  }
+  if (fresh.empty()) {
+    view.motion.forget();
+    return;
+  }
+  const Obstacles candidates = balls(fresh, true);
+  const VelocityEstimate::Result found = view.motion.update(candidates, time);
+  for (Eigen::Index n = 0; n < candidates.size(); ++n) {
+    const int index = fresh[static_cast<std::size_t>(n)];
+    const double depth = (candidates.points().col(n) - view.X_WC.translation()).norm();
+    const double speed = found.velocities.col(n).norm();
+    const bool moves = speed * speed_window > speed_noise * view.camera.noise.sigma(depth);
+    velocities[static_cast<std::size_t>(index)] =
+        moves ? Eigen::Vector3f(found.velocities.col(n).cast<float>()) : Eigen::Vector3f::Zero();
+    uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(moves ? found.uncertainty[n] : 0.0);
+    map.set_moves(index, moves);
+  }
 }
 
 Obstacles Perception::Impl::moving_balls(View& view, double time) {
-  if (shown.empty()) {
-    view.motion.forget();
-    return Obstacles::none();
+  find_velocities(view, time);
+  Obstacles all = balls(shown, true);
+  Eigen::VectorXd uncertainty(all.size());
+  for (Eigen::Index n = 0; n < all.size(); ++n) {
+    uncertainty[n] = static_cast<double>(uncertainties[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])]);
   }
-  const Eigen::Index num = static_cast<Eigen::Index>(shown.size());
-  Obstacles balls = this->balls(shown, true);
-  VelocityEstimate::Result found = view.motion.update(balls, time);
-  for (Eigen::Index n = 0; n < num; ++n) {
-    const double depth = (balls.points().col(n) - view.X_WC.translation()).norm();
-    const double speed = found.velocities.col(n).norm();
-    if (speed > 0.0 && speed * speed_window < speed_noise * view.camera.noise.sigma(depth)) {
-      found.velocities.col(n).setZero();
-      found.uncertainty[n] = std::max(found.uncertainty[n], speed);
-    }
-    const int index = shown[static_cast<std::size_t>(n)];
-    velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
-    map.set_moves(index, found.velocities.col(n).squaredNorm() > 0.0);
-  }
-  return balls.moving(std::move(found.velocities), std::move(found.uncertainty));
+  return all.size() > 0 && uncertainty.maxCoeff() > 0.0 ? all.moving(all.velocities(), std::move(uncertainty)) : all;
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
@@ -261,6 +286,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
   tested.resize(voxels.size());
   is_excluded.resize(voxels.size());
   velocities.resize(voxels.size(), Eigen::Vector3f::Zero());
+  uncertainties.resize(voxels.size());
   shown.clear();
   remembered.clear();
   for (const int index : map.touched()) {
@@ -311,13 +337,11 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
   std::vector<Cell> all;
   for (std::size_t n = 0; n < is_excluded.size(); ++n) {
     const Voxel& voxel = map.voxels()[n];
-    if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0) {
+    if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0 && !map.is_background(voxel)) {
       const bool is_remembered = voxel.shown_by == 0;
-      const BoxBall ball = ball_behind(centre_of(voxel), low_of(voxel), high_of(voxel), views[voxel.camera].X_WC.translation(),
-                                       pushed_back * map.edge(voxel));
+      const BoxBall ball = ball_of(voxel, !is_remembered);
       const Eigen::Vector3d velocity = is_remembered ? Eigen::Vector3d::Zero() : Eigen::Vector3d(velocities[n].cast<double>());
-      all.push_back({ball.centre, ball.radius + static_cast<double>(voxel.error), voxel.camera, newest - voxel.last,
-                     is_remembered, velocity, voxel.is_hidden});
+      all.push_back({ball.centre, ball.radius, voxel.camera, newest - voxel.last, is_remembered, velocity, voxel.is_hidden});
     }
   }
   return all;

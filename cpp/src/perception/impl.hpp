@@ -15,6 +15,12 @@ namespace sidestep {
 
 inline constexpr std::size_t most_cameras = 16;
 
+/// A ball that holds the box of a voxel.
+struct BoxBall {
+  Eigen::Vector3d centre;
+  double radius;
+};
+
 struct Perception::Impl {
   /// A camera with its last image.
   struct View {
@@ -27,6 +33,7 @@ struct Perception::Impl {
     int frame_of_arm;  // Frame on which the camera is; -1: the world.
     Eigen::Isometry3d X_WC;
     double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
+    double begin = std::numeric_limits<double>::quiet_NaN();   // of its first image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows
@@ -60,8 +67,12 @@ struct Perception::Impl {
   void hand_over(std::size_t number, double time, PerceptionReport& report);
   /// Replaces what a source says. Without obstacles that is believed at once: it comes from images that show something.
   void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
-  /// Balls around these voxels; `moved`: around what the last image alone shows.
+  /// The ball of a voxel; `moved`: around what the last image alone shows.
+  BoxBall ball_of(const Voxel& voxel, bool moved) const;
+  /// Those of several, with their velocities where they have moved.
   Obstacles balls(const std::vector<int>& chosen, bool moved) const;
+  /// Finds the velocities of what a camera shows now and has not rested.
+  void find_velocities(View& view, double time);
   /// What a camera shows, with velocities.
   Obstacles moving_balls(View& view, double time);
   /// Takes what other sources say, where it was at a time [s].
@@ -87,9 +98,11 @@ struct Perception::Impl {
   std::vector<std::shared_ptr<const Obstacles>> told;  // what other sources say
   std::uint64_t told_version = 0;                      // Sum of their versions.
   std::vector<Tested> tested;                          // one per voxel
+  std::vector<int> fresh;                              // Voxels that a camera shows and that may move, in work.
   std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
   std::vector<int> last_remembered;                    // The latter, as the controller has them.
   std::vector<Eigen::Vector3f> velocities;             // Per voxel, as the last image that showed it says [m/s].
+  std::vector<float> uncertainties;                    // The same: how far they may be wrong [m/s].
   std::vector<char> is_excluded;                       // Per voxel: explained or left out.
 };
 

@@ -105,6 +105,7 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   report.unseen_time = since(mark);
   view.X_WC = X_WC;
   view.time = time;
+  view.begin = std::isnan(view.begin) ? time : view.begin;
   judge(view, report);
   hand_over(number, time, report);
   report.obstacles_time = since(mark);
@@ -201,6 +202,10 @@ void Perception::forget() {
   const std::lock_guard lock(impl_->mutex);
   impl_->map.clear();
   impl_->tested.clear();
+  for (auto& view : impl_->views) {
+    view.begin = std::numeric_limits<double>::quiet_NaN();
+    view.motion.forget();
+  }
 }
 
 Eigen::Isometry3d Perception::pose(const std::string& camera) const {

@@ -12,7 +12,7 @@ const std::vector<Field<PerceptionSettings>>& fields() {
       {"voxel", &S::voxel, "m", 0.005, 0.1,
        "Edge of the cells in which points are merged, within reach of the arm. Obstacles stand out of surfaces by 0.4 of the edge, and more at edges. Smaller cells stand out less, and cost more."},
       {"reach_margin", &S::reach_margin, "m", 0.0, 2.0,
-       "Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is 1.5 and 2.5 times as long."},
+       "Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is twice and four times as long."},
       {"view_margin", &S::view_margin, "m", 0.0, 5.0,
        "Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes."},
       {"memory", &S::memory, "s", 0.0, inf,

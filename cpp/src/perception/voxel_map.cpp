@@ -19,6 +19,7 @@ constexpr double second_within = 0.5;     // Time within which a second image mu
 constexpr double noise_beyond = 3.0;      // Noise of a depth that is behind a cell, in standard deviations.
 constexpr int missed_at_most = 5;         // Images that see the surface nearby, and not in the cell, after which it was noise.
 constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
+constexpr double settled_noise = 2.0;     // Noise of depths that explains a cell by one nearby, in standard deviations.
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
 constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
@@ -229,6 +230,29 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
   if (seen.time - voxel.last > (voxel.counts ? kept : second_within)) {
     remove(voxel);
   }
+}
+
+bool VoxelMap::is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept {
+  if (voxel.last - voxel.first > background_after) {
+    return true;
+  }
+  const Eigen::Vector3d middle(0.5 * (voxel.low[0] + voxel.high[0]), 0.5 * (voxel.low[1] + voxel.high[1]),
+                               0.5 * (voxel.low[2] + voxel.high[2]));
+  const double depth = (middle - eye).norm(), edge = this->edge(voxel), reach = edge + settled_noise * noise.sigma(depth);
+  const Eigen::Vector3d along = (middle - eye) / std::max(depth, 1e-6);
+  for (double step = edge; step <= reach; step += edge) {
+    for (const double side : {step, -step}) {
+      const Eigen::Vector3f p = (middle + side * along).cast<float>();
+      const int other = voxel_of(p.data());
+      if (other >= 0) {
+        const Voxel& neighbour = voxels_[static_cast<std::size_t>(other)];
+        if (neighbour.counts && neighbour.last - neighbour.first > background_after) {
+          return true;
+        }
+      }
+    }
+  }
+  return false;
 }
 
 void VoxelMap::remove(Voxel& voxel) noexcept {

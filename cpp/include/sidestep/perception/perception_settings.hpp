@@ -8,7 +8,7 @@ namespace sidestep {
 
 /// How what cameras see becomes obstacles.
 struct PerceptionSettings {
-  double voxel = 0.015;
+  double voxel = 0.02;
   double reach_margin = 0.25;
   double view_margin = 2.0;
   double memory = 30.0;

@@ -12,8 +12,8 @@ namespace sidestep {
 class VoxelGrid {
  public:
   static constexpr int num_levels = 3;
-  static constexpr std::array<double, num_levels> scales{1.0, 1.5,
-                                                         2.5};  ///< Edges of the levels' cells, in those of the first.
+  static constexpr std::array<double, num_levels> scales{1.0, 2.0,
+                                                         4.0};  ///< Edges of the levels' cells, in those of the first.
 
   /// Cells of the edge `voxel` [m] up to `fine` [m] from the centre along each axis, coarser ones up to `far` [m].
   VoxelGrid(const Eigen::Vector3d& centre, double fine, double far, double voxel);

@@ -74,6 +74,8 @@ class VoxelMap {
   bool is_background(const Voxel& voxel) const noexcept {
     return grid_.level(voxel.cell) > 0 && voxel.last - voxel.first > background_after;
   }
+  /// Whether a voxel has rested: it has been seen for long, or noise along the ray explains it by one that has.
+  bool is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept;
   double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
   const VoxelGrid& grid() const noexcept { return grid_; }
   /// Number of points of the last image that were too far away.
