@@ -17,15 +17,15 @@ from sidestep.bench.camera_beside import LOADS, BesideRow, divided_cores
 from sidestep.bench.camera_room import HEIGHT, WIDTH, CameraImages, render_images
 from sidestep.bench.camera_stages import CameraCase, CameraRow, RecipeRow
 from sidestep.bench.step import cpu_model, held_up
+from sidestep.perception import PerceptionSettings
 
+USUAL = {name: getattr(PerceptionSettings(), name) for name in ("voxel", "reach_margin", "view_margin")}
 CASES = (
     CameraCase("2k", voxel=0.06, reach_margin=0.0, view_margin=0.1),
     CameraCase("10k", voxel=0.03, reach_margin=0.25, view_margin=0.25),
     CameraCase("20k", voxel=0.02, reach_margin=0.25, view_margin=0.25),
-    CameraCase("default", voxel=0.02, reach_margin=0.25, view_margin=2.0),
-    CameraCase(
-        "default, unseen closed", voxel=0.02, reach_margin=0.25, view_margin=2.0, unseen_is_free=False
-    ),
+    CameraCase("default", **USUAL),
+    CameraCase("default, unseen closed", **USUAL, unseen_is_free=False),
 )
 BESIDE = ("10k", "default")  # cases of the rows beside the loop
 RECIPE_IMAGES = 2  # a round
