@@ -15,6 +15,8 @@ from .camera_rig import RigSettings as RigSettings
 from .camera_scenes import CameraSceneSettings as CameraSceneSettings
 from .camera_scenes import camera_scene_table as camera_scene_table
 from .camera_scenes import run_camera_scenes as run_camera_scenes
+from .camera_times import CameraTimesSettings as CameraTimesSettings
+from .camera_times import run_camera_times as run_camera_times
 from .campaign import parse_shard as parse_shard
 from .campaign import run_campaign as run_campaign
 from .cloud_size import CloudSizeSettings as CloudSizeSettings

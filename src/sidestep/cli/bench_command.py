@@ -10,6 +10,7 @@ import typer
 from sidestep.bench.method import Method
 from sidestep.cli.bench_camera_command import camera_mask, camera_recording
 from sidestep.cli.bench_camera_loop_command import camera_moving, camera_scenes
+from sidestep.cli.bench_camera_times_command import camera_times
 from sidestep.cli.bench_encounters_command import drives, faults, moving
 from sidestep.cli.bench_output import (
     DurationOption,
@@ -55,6 +56,7 @@ app.command("peers")(peers)
 app.command("qp")(qp)
 app.command("points")(points)
 app.command("realtime")(realtime)
+app.command("camera-times")(camera_times)
 app.command("record")(record)
 
 
