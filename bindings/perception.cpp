@@ -253,7 +253,12 @@ void bind_report(nb::module_& m) {
       .def_ro("map_time", &R::map_time, "Time for points and map [s].")
       .def_ro("unseen_time", &R::unseen_time, "Time for unseen space [s].")
       .def_ro("obstacles_time", &R::obstacles_time, "Time to hand obstacles to the controller [s].")
-      .def_prop_ro("total_time", &R::total_time, "Sum of the times [s].");
+      .def_prop_ro("total_time", &R::total_time, "Sum of the times [s].")
+      .def("__repr__", [](const R& r) {
+        return "PerceptionReport(used=" + std::string(r.used ? "True" : "False") + ", seen=" + std::to_string(r.seen) +
+               ", remembered=" + std::to_string(r.remembered) + ", explained=" + std::to_string(r.explained) +
+               ", unseen=" + std::to_string(r.unseen) + ", question=" + nb::repr(nb::cast(r.question)).c_str() + ")";
+      });
 }
 
 void bind_check(nb::module_& m) {
@@ -366,10 +371,16 @@ void bind_perception(nb::module_& m) {
       .def(
           "update_points",
           [](Perception& self, const std::string& camera, nb::handle points, nb::handle time, nb::handle q, nb::handle pose) {
-            Eigen::Matrix3Xd given = Eigen::Matrix3Xd(3, 0);
-            const nb::object flat = nb::module_::import_("numpy").attr("asarray")(points, "float64").attr("reshape")(-1, 3);
+            const nb::object array = nb::module_::import_("numpy").attr("asarray")(points, "float64");
+            const nb::object shape = array.attr("shape");
+            const std::size_t num_axes = nb::len(shape);
+            if (num_axes < 2 || num_axes > 3 || nb::cast<int>(shape[num_axes - 1]) != 3) {
+              throw nb::value_error(
+                  ("points have shape " + std::string(nb::repr(shape).c_str()) + ", allowed: (N, 3) or (height, width, 3)").c_str());
+            }
+            const nb::object flat = array.attr("reshape")(-1, 3);
             const auto rows = nb::cast<nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(flat);
-            given = Eigen::Map<const Eigen::Matrix3Xd>(rows.data(), 3, static_cast<Eigen::Index>(rows.shape(0)));
+            const Eigen::Matrix3Xd given = Eigen::Map<const Eigen::Matrix3Xd>(rows.data(), 3, static_cast<Eigen::Index>(rows.shape(0)));
             const Capture capture = as_capture(time, q, pose);
             const nb::gil_scoped_release release;
             return self.update(camera, given, capture);

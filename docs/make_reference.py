@@ -121,6 +121,7 @@ def option_row(parameter: Any, hints: dict[str, Any]) -> str:
     else:
         shown = "on" if default is True else f"`{getattr(default, 'value', default)}`"
     says = " ".join((getattr(parameter, "help", None) or "").split())
+    says = says.replace("] [", r"] \[")  # a unit and a default are no link
     cells = (f"`{name}`", says, shown)
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
 

@@ -128,3 +128,30 @@ def test_hello_worlds_have_at_most_12_lines(number: str) -> None:
     lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
     left_out = ("//", "#include", "int main")
     assert len([line for line in lines if line not in ("", "}") and not line.startswith(left_out)]) <= 12
+
+
+@pytest.mark.slow
+def test_12_the_arm_goes_around_what_the_camera_sees() -> None:
+    pytest.importorskip("mujoco")
+    output = run("12")
+    assert output.startswith("arrived after ")
+    assert number_after("contacts:", output) == 0
+    text = (EXAMPLES / "12_camera.py").read_text(encoding="utf-8")
+    program = text.split("camera = DepthCamera")[1]  # what is not the world that stands for a real one
+    assert len([line for line in program.splitlines() if line.strip()]) <= 15
+
+
+@pytest.mark.slow
+def test_12_without_the_camera_the_arm_hits_the_box() -> None:
+    """The box stands in the way, or the example would show nothing."""
+    pytest.importorskip("mujoco")
+    text = (EXAMPLES / "12_camera.py").read_text(encoding="utf-8")
+    images = "perception.update(image.camera, image.depth, time=image.time)"
+    assert images in text
+    blind = text.replace(images, "controller.set_obstacles(ss.Obstacles.none())")
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        exec(
+            blind.replace("touched += data.ncon", "touched += data.ncon\n    if touched:\n        break"), {}
+        )
+    assert number_after("contacts:", output.getvalue()) > 0

@@ -1,7 +1,8 @@
 """Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-demo, studio; in figures.py and source_figures.py those of the concepts, in theory_figures.py those of the theory; in
-table.py that of the first screen. That of the studio needs Chromium and `pip install 'sidestep[headless]'`.
+demo, studio; in figures.py and source_figures.py those of the concepts, in camera_figures.py those of a depth camera,
+in theory_figures.py those of the theory; in table.py that of the first screen. That of the studio needs Chromium and
+`pip install 'sidestep[headless]'`.
 """
 
 import argparse
@@ -43,6 +44,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
 FIGURES = {
     "figures": ("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),
     "source_figures": ("believes",),
+    "camera_figures": ("camera-pixels", "camera-map", "camera-unseen"),
     "theory_figures": ("density", "geometry", "systems", "control", "clearances", "timed-path"),
 }
 

@@ -27,7 +27,7 @@ def exists(test: str) -> bool:
     """Whether a file has a test, as `path::name`: a function in Python, a test case in C++."""
     path, name = test.split("::")
     file = ROOT / path
-    pattern = rf"^def {name}\(" if file.suffix == ".py" else rf"^BOOST_AUTO_TEST_CASE\({name}\b"
+    pattern = rf"^def {name}\(" if file.suffix == ".py" else rf"^BOOST_(AUTO|FIXTURE)_TEST_CASE\({name}\b"
     return file.is_file() and re.search(pattern, file.read_text(encoding="utf-8"), re.MULTILINE) is not None
 
 

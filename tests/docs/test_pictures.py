@@ -14,19 +14,24 @@ IMAGES = Path(__file__).parents[2] / "docs" / "images"
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.syspath_prepend(str(IMAGES))
+    import camera_figures
     import figures
     import source_figures
     import theory_figures
 
     monkeypatch.setattr(figures, "HERE", tmp_path)
-    yield figures, theory_figures, source_figures
-    for name in ("figures", "theory_figures", "source_figures"):
+    yield figures, theory_figures, source_figures, camera_figures
+    for name in ("figures", "theory_figures", "source_figures", "camera_figures"):
         sys.modules.pop(name)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["barriers", "planner", "density", "geometry", "systems", "control", "timed_path", "believes"]
+    "name",
+    [
+        *("barriers", "planner", "density", "geometry", "systems", "control", "timed_path", "believes"),
+        *("camera_pixels", "camera_map", "camera_unseen"),
+    ],
 )
 def test_figure_is_drawn(figures, tmp_path: Path, name: str) -> None:
     module = next(module for module in figures if hasattr(module, name))

@@ -243,6 +243,19 @@ def test_images_arrive_late_in_order_and_once() -> None:
     assert camera.delivered(9.0) == []
 
 
+def test_images_are_taken_at_their_rate_in_a_loop_of_any_rate() -> None:
+    model = _ball_model()
+    camera, data = _camera(model, latency=0.05, rate=30.0), mujoco.MjData(model.model)
+    arrived = [(k, image.time) for k in range(150) for image in camera.observe(data, 0.001 * k)]
+    # Due every 33.3 ms, taken in the next step; the loop has a step each millisecond.
+    assert [time for _, time in arrived] == pytest.approx([0.0, 0.034, 0.067], abs=1e-9)
+    assert [k for k, _ in arrived] == [50, 84, 117]
+    # After a pause one image is taken, and none is made up for.
+    assert [image.time for image in camera.observe(data, 1.0)] == pytest.approx([0.1, 0.134], abs=1e-9)
+    assert camera.observe(data, 1.03) == []
+    assert [image.time for image in camera.observe(data, 1.2)] == pytest.approx([1.0], abs=1e-9)
+
+
 def test_the_share_that_is_lost_is_the_share_that_is_set() -> None:
     model = _ball_model()
     tiny = Pinhole(width=8, height=6, cx=4.0, cy=3.0, fx=8.0, fy=8.0)
@@ -303,6 +316,7 @@ def test_noise_leaves_the_truth_alone() -> None:
         (Pinhole(cx=float("nan")), {}, "cx, cy are nan"),
         (Pinhole(), {"latency": -0.1}, "latency is -0.1 s"),
         (Pinhole(), {"lost": 1.5}, "lost is 1.5"),
+        (Pinhole(), {"rate": 0.0}, "rate is 0.0 Hz, allowed: above 0"),
         (Pinhole(), {"links": "hull"}, "links is 'hull', allowed: visual, collision"),
         (Pinhole(), {"noise": "lidar"}, "noise is 'lidar', allowed: none, d435"),
         (Pinhole(pose=2.0 * np.eye(4)), {}, "'front': pose is not a rigid transform"),

@@ -1,6 +1,11 @@
 from .bag import BagRecording as BagRecording
 from .bag_writer import BagWriter as BagWriter
 from .camera_record import CameraRecord as CameraRecord
+from .camera_record import look_at as look_at
+from .feed import Feed as Feed
+from .feed import FrameSource as FrameSource
+from .feed import take as take
+from .feed import watch as watch
 from .folder import FolderRecording as FolderRecording
 from .folder_writer import FolderWriter as FolderWriter
 from .frame import Frame as Frame

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sidestep._core import DepthCamera, real_array
 from sidestep.math.pose import checked_pose
+from sidestep.math.pose import look_at as look_at
 
 DISTORTION_MODELS = ("none", "brown_conrady", "inverse_brown_conrady", "kannala_brandt")
 

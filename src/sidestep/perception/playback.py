@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from sidestep._core import Perception, PerceptionReport, PerceptionSettings
 from sidestep.arm import Arm
 from sidestep.controller import Controller
 from sidestep.perception.camera_record import CameraRecord
+from sidestep.perception.feed import take
 from sidestep.perception.frame import Frame
 from sidestep.perception.recording import Recording
 from sidestep.perception.seen_stages import SeenStages
@@ -79,11 +80,7 @@ class Playback:
             if q is None:
                 self.skipped += 1
                 continue
-            unit = frame.unit if frame.depth.dtype == np.uint16 else None
-            report = self.perception.update(
-                frame.camera, frame.depth, time=frame.time, unit=unit, q=q, pose=frame.pose
-            )
-            yield PlayedFrame(frame, q, report)
+            yield PlayedFrame(frame, q, take(self.perception, replace(frame, q=q)))
 
     def stages(self, camera: str) -> SeenStages:
         """What the last image of a camera became."""

@@ -99,6 +99,7 @@ class SimulatedCamera:
         noise: "none", "d435", "kinect", "structured_light", or a noise model with other values.
         latency: from the capture to the delivery [s].
         lost: share of images in [0, 1] that never arrive.
+        rate: of the images that `observe` takes [Hz].
         seed: of the noise and of what is lost.
         links: "visual": links look like their visual meshes, those without any like their collision parts;
             "collision": like their convex collision parts, which are drawn ten times as fast.
@@ -116,10 +117,11 @@ class SimulatedCamera:
         noise: str | DepthNoiseModel = "none",
         latency: float = 0.0,
         lost: float = 0.0,
+        rate: float = 30.0,
         seed: int = 0,
         links: LinkSurface = "visual",
     ) -> None:
-        _check(model, camera, latency, lost)
+        _check(model, camera, latency, lost, rate)
         self.camera, self.latency, self.lost, self.seed = camera, float(latency), float(lost), seed
         self._model = model
         self._X_LC = checked_pose(camera.pose, f"camera {camera.name!r}: pose")
@@ -127,7 +129,8 @@ class SimulatedCamera:
         self._owner = _owners(model)
         self._count = 0
         self._on_the_way: deque[SimulatedImage] = deque()
-        self._last = -np.inf
+        self.rate = float(rate)
+        self._last, self._due = -np.inf, -np.inf
         self._renderer = DepthRenderer(
             model,
             size=(camera.width, camera.height),
@@ -182,6 +185,26 @@ class SimulatedCamera:
         self._on_the_way.append(image)
         return image
 
+    def observe(
+        self, data: mujoco.MjData, now: float, *, attached: Sequence[str] = ()
+    ) -> list[SimulatedImage]:
+        """Takes an image whenever one is due, `rate` times a second, and gives those that arrived by now.
+
+        Call it in every step of a simulation, instead of `capture` and `delivered`.
+
+        Args:
+            data, attached: see `capture`.
+            now: the time of `data` [s].
+
+        Raises:
+            ValueError, RuntimeError: see `capture`.
+        """
+        if now + ROUNDING >= self._due:
+            self.capture(data, now, attached=attached)
+            late = not self._due > now - 1.0 / self.rate  # the first one, or after a pause
+            self._due = (now if late else self._due) + 1.0 / self.rate
+        return self.delivered(now)
+
     def delivered(self, now: float) -> list[SimulatedImage]:
         """The images that arrived since the last call, oldest first: those with time + latency <= now."""
         arrived = []
@@ -223,7 +246,7 @@ def _owners(model: SimulationModel) -> npt.NDArray[np.uint8]:
     return np.append(np.where(arm, ARM, OTHER), NOTHING).astype(np.uint8)
 
 
-def _check(model: SimulationModel, camera: CameraGeometry, latency: float, lost: float) -> None:
+def _check(model: SimulationModel, camera: CameraGeometry, latency: float, lost: float, rate: float) -> None:
     owner = f"camera {camera.name!r}"
     if camera.distortion_model != "none":
         raise ValueError(
@@ -245,3 +268,5 @@ def _check(model: SimulationModel, camera: CameraGeometry, latency: float, lost:
         raise ValueError(f"{owner}: latency is {latency} s, allowed: 0 and more")
     if not 0.0 <= lost <= 1.0:
         raise ValueError(f"{owner}: lost is {lost}, allowed: 0 to 1")
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ValueError(f"{owner}: rate is {rate} Hz, allowed: above 0")
