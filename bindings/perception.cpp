@@ -333,6 +333,14 @@ void bind_perception(nb::module_& m) {
   bind_report(m);
   bind_check(m);
   bind_settings<PerceptionSettings>(m, "PerceptionSettings", "How what cameras see becomes obstacles.");
+  m.def(
+      "perception_settings_fields",
+      [] {
+        nb::list rows;
+        describe_fields<PerceptionSettings>(rows, "");
+        return rows;
+      },
+      nb::sig("def perception_settings_fields() -> list[dict[str, float | str]]"), "Every setting of Perception, as controller_settings_fields.");
   nb::class_<Perception>(m, "Perception",
                          "From depth cameras to the obstacles of a controller: takes the arm out of the image, remembers what is hidden, and hands\n"
                          "the rest on.\n\n"

@@ -17,6 +17,7 @@ from typing import Any, get_type_hints
 import typer
 
 import sidestep
+from sidestep._core import perception_settings_fields
 from sidestep.cli import app
 from sidestep.controller import controller_settings_fields
 
@@ -53,6 +54,14 @@ by default. [Tuning](../how-to/tuning.md) says what to turn first.
 `python docs/make_reference.py` writes this page from the tables in the core.
 
 """
+PERCEPTION = """
+
+## Perception
+
+`ss.perception.Perception(controller, cameras, ss.perception.PerceptionSettings(voxel=0.015))`:
+[from a depth camera](../how-to/camera.md).
+
+"""
 COMMANDS = """# Command line
 
 Every command has `--help`. Exit codes: 0 on success, 1 when a run fails, 2 on bad input, with one line on stderr.
@@ -70,10 +79,10 @@ def first_sentence(name: str, package: ModuleType = sidestep) -> str:
     return re.split(r"(?<=[a-z\])])\. (?=[A-Z])", line)[0].rstrip(",;:").replace("|", r"\|")
 
 
-def settings_table() -> list[str]:
-    """The tree of the controller's settings, a row each, as the core states it."""
+def settings_table(fields: list[dict[str, float | str]]) -> list[str]:
+    """Settings, a row each, as the core states them."""
     rows = ["| setting | default | unit | allowed | what it is and trades |\n|---|---|---|---|---|"]
-    for field in controller_settings_fields():
+    for field in fields:
         least, most = (f"{field[end]:g}" for end in ("least", "most"))
         allowed = "on, off" if isinstance(field["default"], bool) else f"{least} to {most}"
         default = (
@@ -144,7 +153,11 @@ def pages() -> dict[Path, str]:
     names = [part for module, names in public_names().items() for part in table(module, names)]
     return {
         FOLDER / "python.md": "\n".join([NAMES, *names]) + "\n",
-        FOLDER / "settings.md": SETTINGS + "\n".join(settings_table()) + "\n",
+        FOLDER / "settings.md": SETTINGS
+        + "\n".join(settings_table(controller_settings_fields()))
+        + PERCEPTION
+        + "\n".join(settings_table(perception_settings_fields()))
+        + "\n",
         FOLDER / "command-line.md": "\n".join(
             [COMMANDS, *command_parts("sidestep", typer.main.get_command(app))]
         )

@@ -4015,6 +4015,8 @@ class PerceptionReport:
     def total_time(self) -> float:
         """Sum of the times [s]."""
 
+    def __repr__(self) -> str: ...
+
 class CameraCorrection:
     """
     Where a camera is and how its clock goes, as the arm in its images says.

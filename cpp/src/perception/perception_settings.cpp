@@ -23,7 +23,7 @@ const std::vector<Field<PerceptionSettings>>& fields() {
        "Number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it. More is safer against noise, and sees thin things later."},
       {"unseen_is_free", &S::unseen_is_free, "-", 0, 1,
        "Whether space that no camera has seen yet counts as free. Otherwise the arm does not enter it: it keeps clear of what nobody has looked at, and reaches less."},
-      {"valid_for", &S::valid_for, "s", 0.0, inf,
+      {"valid_for", &S::valid_for, "s", 0.001, inf,
        "Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images."},
   };
   return all;
