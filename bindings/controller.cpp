@@ -18,22 +18,6 @@
 namespace sidestep::python {
 namespace {
 
-template <class Settings>
-void describe_fields(nb::list& rows, const std::string& group, bool optional = false) {
-  const Settings defaults{};
-  for (const Field<Settings>& field : fields<Settings>()) {
-    nb::dict row;
-    row["name"] = group + field.name;
-    row["unit"] = field.unit;
-    row["default"] = get_field(defaults, field);
-    row["least"] = field.least;
-    row["most"] = field.most;
-    row["trades"] = field.trades;
-    row["optional"] = optional;
-    rows.append(row);
-  }
-}
-
 /// A part that may be left out, as a property; what is written to a part of it counts.
 template <class Class, class Owner, class Value>
 void optional_part(Class& c, const char* name, const char* type, std::optional<Value> Owner::*member) {

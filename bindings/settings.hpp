@@ -207,4 +207,21 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
   return c;
 }
 
+/// Adds a row for each field: name, unit, default, allowed range and what it trades.
+template <class Settings>
+void describe_fields(nb::list& rows, const std::string& group, bool optional = false) {
+  const Settings defaults{};
+  for (const Field<Settings>& field : fields<Settings>()) {
+    nb::dict row;
+    row["name"] = group + field.name;
+    row["unit"] = field.unit;
+    row["default"] = get_field(defaults, field);
+    row["least"] = field.least;
+    row["most"] = field.most;
+    row["trades"] = field.trades;
+    row["optional"] = optional;
+    rows.append(row);
+  }
+}
+
 }  // namespace sidestep::python

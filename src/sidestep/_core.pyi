@@ -4112,7 +4112,7 @@ class PerceptionSettings:
         clear_after, default 2, allowed 1 to 10: Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later.
         least_pixels, default 3, allowed 1 to 100: Number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it. More is safer against noise, and sees thin things later.
         unseen_is_free, default True, allowed 0 to 1: Whether space that no camera has seen yet counts as free. Otherwise the arm does not enter it: it keeps clear of what nobody has looked at, and reaches less.
-        valid_for [s], default 0.25, allowed 0 to inf: Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images.
+        valid_for [s], default 0.25, allowed 0.001 to inf: Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images.
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -4184,6 +4184,9 @@ class PerceptionSettings:
 
     @valid_for.setter
     def valid_for(self, value: float, /) -> None: ...
+
+def perception_settings_fields() -> list[dict[str, float | str]]:
+    """Every setting of Perception, as controller_settings_fields."""
 
 class Perception:
     """

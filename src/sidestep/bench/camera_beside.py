@@ -142,7 +142,8 @@ class BesideRow:
         self._seen = images[: max(1, load.cameras)]
         self._taken, self._late, self._lost = StepTimes(), StepTimes(), LostFrames()
         self._missed, self._prioritised = 0, False
-        self._loop_cores, self._own_core = divided_cores()
+        divided: tuple[set[int] | None, set[int] | None] = divided_cores()
+        self._loop_cores, self._own_core = divided
         with on_cores(self._loop_cores):
             self._controller = Controller(arm, ControllerSettings(seed=seed))
         cameras = [each.camera for each in self._seen]

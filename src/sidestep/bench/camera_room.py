@@ -101,9 +101,15 @@ def render_images(
     """
     import mujoco
 
+    from sidestep.robot import Robot
     from sidestep.simulation import SimulatedCamera, build_model
 
-    model = build_model(arm.robot, room())
+    robot = arm.robot
+    if not isinstance(robot, Robot):
+        raise TypeError(
+            f"robot {robot.name!r} has no meshes that a camera could see; allowed: an arm of a description"
+        )
+    model = build_model(robot, room())
     data = mujoco.MjData(model.model)
     seen = []
     for camera in cameras(width=width, height=height):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter, thread_time
 from typing import Any
 
@@ -185,8 +186,8 @@ class RecipeRow:
             frame = self._images.at(self._number * 7)  # from all over the swing
             self._number += 1
             (balls, stages), wall, thread, interrupted = timed(
-                lambda frame=frame: cloud_recipe.update_by_recipe(
-                    self._controller, self._arm, self._images.camera, frame
+                partial(
+                    cloud_recipe.update_by_recipe, self._controller, self._arm, self._images.camera, frame
                 )
             )
             if count:

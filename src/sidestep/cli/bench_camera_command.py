@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from sidestep.cli.bench_encounters_command import (
@@ -69,7 +69,7 @@ def camera_mask(
         width=width,
         height=height,
         translation=translation,
-        rotation=float(np.radians(rotation)),
+        rotation=math.radians(rotation),
         clock=clock,
         looks=looks,  # type: ignore[arg-type]
         seed=seed,
@@ -153,7 +153,7 @@ def camera_recording(
         robot,
         pose,
         translation=translation,
-        rotation=float(np.radians(rotation)),
+        rotation=math.radians(rotation),
         draws=draws,
         draft=draft,
         seed=seed,

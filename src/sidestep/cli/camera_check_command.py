@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from sidestep.cli.bench_output import figures_table
@@ -82,6 +81,8 @@ def check(
     for document in documents:
         _print(document, terminal)
     if out is not None:
+        import numpy as np
+
         np.savetxt(out, documents[0]["pose"], fmt="%.9f")
         terminal.print(f"Pose: {out}", highlight=False, markup=False, soft_wrap=True)
     if json is not None:
@@ -110,7 +111,7 @@ def _corrections(
                     for one in checks.values():
                         one.add_state(q, time=moment)
                     latest = moment
-            unit = frame.unit if frame.depth.dtype == np.uint16 else None
+            unit = frame.unit if frame.depth.dtype == "uint16" else None
             checks[frame.camera].add(frame.depth, time=time, unit=unit)
     return [checks[camera.name].solve() for camera in cameras]
 
@@ -134,7 +135,7 @@ def camera_document(camera: DepthCamera, found: CameraCorrection, *, times_known
         )
     if found.rotation > camera.rotation_error:
         off.append(
-            f"turned by {np.rad2deg(found.rotation):.2f}°, more than {np.rad2deg(camera.rotation_error):.2f}°"
+            f"turned by {math.degrees(found.rotation):.2f}°, more than {math.degrees(camera.rotation_error):.2f}°"
         )
     if clock is not None and abs(clock) > camera.clock_error:
         off.append(f"its clock off by {1e3 * clock:.1f} ms, more than {1e3 * camera.clock_error:.1f} ms")
@@ -154,7 +155,7 @@ def camera_document(camera: DepthCamera, found: CameraCorrection, *, times_known
         "overshoot_m": found.overshoot,
         "images": found.images,
         "points": found.points,
-        "pose": np.asarray(found.pose).tolist(),
+        "pose": found.pose.tolist(),
     }
 
 
@@ -167,7 +168,7 @@ def _print(document: dict[str, Any], terminal: Console) -> None:
         within = "" if document[spread] is None else f" ± {factor * document[spread]:{form}}"
         return f"{factor * document[name]:{form}}{within}"
 
-    degree = float(np.rad2deg(1.0))
+    degree = math.degrees(1.0)
     table = figures_table(document["camera"], "")
     for name, value in (
         ("moved by [mm]", measured("translation_m", "translation_spread_m", 1e3, ".1f")),

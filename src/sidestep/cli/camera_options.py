@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 import typer
 
 from sidestep.cli.bench_output import with_bar
 from sidestep.cli.limit_options import by_joint
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
     from rich.console import Console
 
     from sidestep import Arm
@@ -152,6 +153,8 @@ def read_pose(path: Path) -> npt.NDArray[np.float64]:
             if text.lstrip().startswith("[")
             else [line.split() for line in text.splitlines()]
         )
+        import numpy as np
+
         matrix = np.array([row for row in rows if row], dtype=np.float64)
     except (ValueError, TypeError) as error:
         raise ValueError(f"--pose: '{path}' is no matrix: {error}") from error
@@ -182,6 +185,8 @@ def standing_q(texts: list[str] | None, arm: Arm) -> npt.NDArray[np.float64] | N
     if not texts:
         return None
     names = list(arm.robot.coordinate_names)
+    import numpy as np
+
     q = np.array(arm.neutral, dtype=np.float64)
     for joint, value in by_joint(texts, "--q").items():
         if joint not in names:
@@ -196,6 +201,6 @@ def camera_errors(
     """Errors as `DepthCamera` takes them [m], [rad], [s]; None: its default."""
     return {
         "translation_error": None if pose_error_mm is None else 1e-3 * pose_error_mm,
-        "rotation_error": None if pose_error_deg is None else float(np.deg2rad(pose_error_deg)),
+        "rotation_error": None if pose_error_deg is None else math.radians(pose_error_deg),
         "clock_error": None if clock_error_ms is None else 1e-3 * clock_error_ms,
     }
