@@ -14,8 +14,6 @@ namespace sidestep {
 namespace {
 
 constexpr double ever = std::numeric_limits<double>::infinity();
-constexpr double speed_window = 0.15;    // Time over which a velocity is found, about [s].
-constexpr double speed_noise = 2.0;      // Displacement in that time that may be noise of depths, in standard deviations.
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
 constexpr int reach_samples = 2000;      // Random configurations of which the reach is taken.
@@ -260,11 +258,8 @@ void Perception::Impl::find_velocities(View& view, double time) {
   const VelocityEstimate::Result found = view.motion.update(candidates, time);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     const int index = fresh[static_cast<std::size_t>(n)];
-    const double depth = (candidates.points().col(n) - view.X_WC.translation()).norm();
-    const double speed = found.velocities.col(n).norm();
-    const bool moves = speed * speed_window > speed_noise * view.camera.noise.sigma(depth);
-    velocities[static_cast<std::size_t>(index)] =
-        moves ? Eigen::Vector3f(found.velocities.col(n).cast<float>()) : Eigen::Vector3f::Zero();
+    const bool moves = found.velocities.col(n).squaredNorm() > 0.0;
+    velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
     uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(moves ? found.uncertainty[n] : 0.0);
     map.set_moves(index, moves);
   }
