@@ -2,13 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "impl.hpp"
 #include "nearby.hpp"
-#include "sidestep/math/random_stream.hpp"
+#include "reach.hpp"
 
 namespace sidestep {
 namespace {
@@ -16,118 +15,13 @@ namespace {
 constexpr double ever = std::numeric_limits<double>::infinity();
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
-constexpr int reach_samples = 2000;      // Random configurations of which the reach is taken.
-constexpr double reach_more = 1.05;      // Reach in what these reach.
-constexpr double thin_share = 0.5;       // Size of a box along one axis that is a surface across it, as a share of the others.
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
 Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
 Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
-/// The ball around a box whose middle is pushed away from the camera by `depth`: it holds the box all the same, and stands out of it less on
-/// the side that is seen, by sqrt(h² + depth²) - depth in place of h for a box with the half diagonal h in that plane.
-///
-/// A box that is thin along an axis holds a surface across that axis, and is pushed along it; another one along the ray.
-BoxBall ball_behind(const Eigen::Vector3d& middle, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
-                    const Eigen::Vector3d& eye, double depth) {
-  const Eigen::Vector3d size = high - low, ray = (middle - eye).normalized();
-  Eigen::Index axis = 0;
-  const double thin = size.minCoeff(&axis);
-  Eigen::Vector3d away = ray;
-  if (thin < thin_share * (size.sum() - thin) / 2.0) {
-    away = Eigen::Vector3d::Unit(axis) * (ray[axis] < 0.0 ? -1.0 : 1.0);
-  }
-  const Eigen::Vector3d centre = middle + depth * away;
-  return {centre, (centre - low).cwiseMax(high - centre).norm()};
-}
-
-/// How far the ellipsoids of an arm get from its first joint [m], about: of random configurations, and a little more. Beyond, cells are coarser.
-double reach_of(const Arm& arm, Eigen::Vector3d& centre) {
-  const Robot& robot = arm.robot();
-  const std::vector<BodyEllipsoid> ellipsoids = body_ellipsoids(robot, arm.body(), "perception");
-  centre = robot.num_joints() > 0 ? Eigen::Vector3d(robot.joints().front().X_PJ.translation()) : Eigen::Vector3d::Zero();
-  KinematicState state(robot);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
-  Eigen::VectorXd q = zero;
-  RandomStream random(0);
-  double farthest = 0.0;
-  for (int sample = 0; sample < reach_samples; ++sample) {
-    for (int i = 0; i < robot.num_coordinates(); ++i) {
-      const double low = robot.limits().lower[i], high = robot.limits().upper[i];
-      q[i] = std::isfinite(low) && std::isfinite(high) ? random.uniform(low, high)
-             : robot.is_prismatic(i)                   ? 0.0
-                                                       : random.uniform(-std::numbers::pi, std::numbers::pi);
-    }
-    state.update(robot, q, zero);
-    for (const BodyEllipsoid& ellipsoid : ellipsoids) {
-      const KinematicState::Link& link = link_or_world(state, ellipsoid.joint);
-      farthest = std::max(farthest, (link.R_WL * ellipsoid.mean + link.p_WL - centre).norm() + ellipsoid.extent);
-    }
-  }
-  return reach_more * farthest;
-}
-
-VoxelMap make_map(const Arm& arm, const PerceptionSettings& settings) {
-  Eigen::Vector3d centre;
-  const double reach = reach_of(arm, centre);
-  return VoxelMap(centre, reach, settings);
-}
-
 }  // namespace
-
-Perception::Impl::View::View(const DepthCamera& its, const Arm& arm)
-    : camera(its),
-      rays(its),
-      image(its),
-      mask(arm.robot(), arm.body()),
-      frame_of_arm(its.link.empty() ? -1 : arm.robot().frame_index(its.link)),
-      X_WC(its.pose) {}
-
-Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras, const PerceptionSettings& chosen)
-    : controller(its),
-      settings(chosen),
-      arm(its.arm()),
-      zero(Eigen::VectorXd::Zero(arm->num_coordinates())),
-      before(arm->robot()),
-      now(arm->robot()),
-      after(arm->robot()),
-      map(make_map(*arm, chosen)) {
-  views.reserve(cameras.size());
-  for (const DepthCamera& camera : cameras) {
-    views.emplace_back(camera, *arm);
-  }
-  if (!settings.unseen_is_free) {
-    Eigen::Vector3d centre;
-    const double reach = reach_of(*arm, centre);
-    unseen.emplace(centre, reach, settings);
-  }
-}
-
-std::size_t Perception::Impl::index(const std::string& camera) const {
-  std::string names;
-  for (std::size_t n = 0; n < views.size(); ++n) {
-    if (views[n].camera.name == camera) {
-      return n;
-    }
-    names += (n == 0 ? "'" : ", '") + views[n].camera.name + "'";
-  }
-  throw std::invalid_argument("perception: there is no camera '" + camera + "', there are: " + names);
-}
-
-void Perception::Impl::refresh_arm() {
-  Arm current = controller.arm();
-  if (current.content_hash() != arm->content_hash()) {
-    arm = std::move(current);
-    for (View& view : views) {
-      view.mask = ArmMask(arm->robot(), arm->body());
-    }
-  }
-}
-
-Eigen::Isometry3d Perception::Impl::pose_of(const View& view, const KinematicState& state) const {
-  return view.frame_of_arm < 0 ? view.camera.pose : frame_pose(arm->robot(), state, view.frame_of_arm) * view.camera.pose;
-}
 
 void Perception::Impl::add_unseen(const SeenImage& seen) {
   unseen->add(seen);
@@ -209,11 +103,11 @@ void Perception::Impl::tell(const std::string& source, Obstacles obstacles, cons
   controller.set_obstacles(std::move(obstacles), options);
 }
 
-BoxBall Perception::Impl::ball_of(const Voxel& voxel, bool moved) const {
+CellBall Perception::Impl::ball_of(const Voxel& voxel, bool moved) const {
   // The middle of what the last image shows moves with it; the ball holds what images before have shown, too.
   const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
-  BoxBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
-                             views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
+  CellBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
+                              views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
   ball.radius += static_cast<double>(voxel.error);
   return ball;
 }
@@ -227,7 +121,7 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
   Eigen::VectorXd radii(num);
   for (Eigen::Index n = 0; n < num; ++n) {
     const auto index = static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)]);
-    const BoxBall ball = ball_of(map.voxels()[index], moved);
+    const CellBall ball = ball_of(map.voxels()[index], moved);
     points.col(n) = ball.centre;
     radii[n] = ball.radius;
     if (moved) {
@@ -334,7 +228,7 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
     const Voxel& voxel = map.voxels()[n];
     if (voxel.cell >= 0 && voxel.counts && is_excluded[n] == 0 && !map.is_background(voxel)) {
       const bool is_remembered = voxel.shown_by == 0;
-      const BoxBall ball = ball_of(voxel, !is_remembered);
+      const CellBall ball = ball_of(voxel, !is_remembered);
       const Eigen::Vector3d velocity = is_remembered ? Eigen::Vector3d::Zero() : Eigen::Vector3d(velocities[n].cast<double>());
       all.push_back({ball.centre, ball.radius, voxel.camera, newest - voxel.last, is_remembered, velocity, voxel.is_hidden});
     }

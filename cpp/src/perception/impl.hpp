@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cell_ball.hpp"
 #include "sidestep/perception/perception.hpp"
 #include "sidestep/perception/unseen_space.hpp"
 #include "sidestep/scene/velocity_estimate.hpp"
@@ -14,12 +15,6 @@
 namespace sidestep {
 
 inline constexpr std::size_t most_cameras = 16;
-
-/// A ball that holds the box of a voxel.
-struct BoxBall {
-  Eigen::Vector3d centre;
-  double radius;
-};
 
 struct Perception::Impl {
   /// A camera with its last image.
@@ -68,7 +63,7 @@ struct Perception::Impl {
   /// Replaces what a source says. Without obstacles that is believed at once: it comes from images that show something.
   void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
   /// The ball of a voxel; `moved`: around what the last image alone shows.
-  BoxBall ball_of(const Voxel& voxel, bool moved) const;
+  CellBall ball_of(const Voxel& voxel, bool moved) const;
   /// Those of several, with their velocities where they have moved.
   Obstacles balls(const std::vector<int>& chosen, bool moved) const;
   /// Finds the velocities of what a camera shows now and has not rested.
