@@ -197,8 +197,8 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
     const double sees_to = seen.sees_to(i);
     if (sees_to > middle.z() + half + noise) {
       ++num_free;
-    } else if (sees_to < middle.z() - half - noise) {
-      return Sight::hidden;
+    } else if (label == PixelLabel::arm || sees_to < middle.z() - half - noise) {
+      return Sight::hidden;  // also where the arm is as near: it takes what touches it with it
     } else {
       ++num_surface;
     }

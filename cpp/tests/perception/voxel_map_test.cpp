@@ -149,6 +149,11 @@ BOOST_FIXTURE_TEST_CASE(the_arm_in_front_hides_too, Mapped) {
   add();
   add();
   BOOST_TEST(near(ball_at, 0.12) == before);
+  std::fill(no_arm.begin(), no_arm.end(), 1.40f);  // the arm is where the ball is
+  for (int n = 0; n < 10; ++n) {
+    add();
+  }
+  BOOST_TEST(near(ball_at, 0.12) == before);
   std::fill(no_arm.begin(), no_arm.end(), 2.5f);  // the arm is behind: what is in front of it is free
   add();
   add();
