@@ -22,6 +22,7 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_controller(m);
   sidestep::python::bind_sources(m);
   sidestep::python::bind_real_time(m);
+  sidestep::python::bind_depth_camera(m);
   sidestep::python::bind_perception(m);
   sidestep::python::bind_thesis(m);
 }

@@ -19,6 +19,7 @@ void bind_controller(nanobind::module_& m);
 void bind_sources(nanobind::module_& m);
 void bind_real_time(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
+void bind_depth_camera(nanobind::module_& m);
 void bind_perception(nanobind::module_& m);
 void bind_thesis(nanobind::module_& m);
 

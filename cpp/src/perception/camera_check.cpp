@@ -229,8 +229,7 @@ bool CameraCheck::state_at(double time, Eigen::VectorXd& q) const {
   return true;
 }
 
-CameraCorrection CameraCheck::solve() const {
-  // Points near the arm, wherever the camera may be: the same for all fits.
+CameraCheck CameraCheck::near_arm() const {
   CameraCheck near = *this;
   Fit place(*this);
   Eigen::VectorXd q(arm_.num_coordinates());
@@ -254,6 +253,11 @@ CameraCorrection CameraCheck::solve() const {
     }
     near.images_.push_back(std::move(kept));
   }
+  return near;
+}
+
+CameraCorrection CameraCheck::solve() const {
+  const CameraCheck near = near_arm();
   CameraCorrection result;
   for (const Image& image : near.images_) {
     result.images += image.points.cols() > 0 ? 1 : 0;

@@ -52,6 +52,8 @@ class CameraCheck {
   };
   struct Fit;
 
+  /// The same with the points near the arm alone, wherever the camera may be.
+  CameraCheck near_arm() const;
   bool state_at(double time, Eigen::VectorXd& q) const;
 
   Arm arm_;
