@@ -55,7 +55,7 @@ def test_view_writes_a_picture_and_its_figures(invoke: Invoke, capsys: pytest.Ca
     assert document["through_share"] == 0.0
     assert document["pixels"]["nothing"] == HOLES * CAMERA.height
     assert 700 < document["pixels"]["arm"] < 1000
-    assert document["cells"]["seen"] > 14_000
+    assert document["cells"]["seen"] > 13_500  # the wall, in cells that grow with the distance from the arm
     with Image.open("out.png") as image:
         assert image.width > 1000
 

@@ -90,7 +90,7 @@ def test_a_played_recording_has_all_figures_and_pictures(tmp_path: Path) -> None
     assert camera["holes"]["p50"] == pytest.approx(HOLES / WIDTH)
     assert 700 < camera["arm_pixels"]["p50"] < 1000
     assert camera["through_share"]["max"] == 0.0
-    assert camera["seen"]["max"] > 14_000  # the wall
+    assert camera["seen"]["max"] > 13_500  # the wall, in cells that grow with the distance from the arm
     assert 0.0 < camera["remembered"]["max"] < 500  # what the arm hides of it
     assert camera["questions"] == {}
     stages = camera["stages_s"]
