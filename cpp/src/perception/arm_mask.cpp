@@ -14,7 +14,7 @@ namespace {
 constexpr float noise_of_depth = 3.0f;  // Noise along the ray that a pixel of the arm may have, in standard deviations.
 constexpr double pixels_at_edge = 1.0;  // Error of a silhouette [pixel].
 constexpr double core_share = 0.5;      // Semi-axes of an ellipsoid's core, as a share of its own: links fill it.
-constexpr int core_stride = 4;          // Every how many pixels rays through cores are looked at, in both directions.
+constexpr int core_stride = 2;          // Every how many pixels rays through cores are looked at, in both directions.
 constexpr float no_front = std::numeric_limits<float>::infinity();
 
 /// The displacement of the farthest point of an ellipsoid in the camera's frame between two times [m], at most.

@@ -23,7 +23,7 @@ void check_size(const DepthCamera& camera, std::size_t size) {
   }
 }
 
-constexpr float farthest = 1e4f;  // Depth above which a number stands for nothing seen [m].
+constexpr float farthest = 100.0f;  // Depth above which no camera sees [m]: floats in millimetres are nothing.
 
 /// Depth in metres, 0 where nothing was seen or it is too near.
 void convert(const float* raw, float unit, float low, std::size_t size, float* depth) noexcept {

@@ -16,13 +16,19 @@ namespace {
 constexpr double least_valid_share = 0.01;      // Share of pixels with a depth, below which an image shows nothing at all.
 constexpr double smoothing_time = 0.5;          // Time constant of the share of rays that see through the arm [s].
 constexpr double through_share_at_most = 0.25;  // The same, above which the arm is not where it should be.
-constexpr int least_rays = 200;                 // Rays through the arm from which on it can be told.
+constexpr double sees_nothing_of_arm = 0.9;     // The same, of one image, above which it is not used.
+constexpr int least_rays = 60;                  // Rays through the arm from which on it can be told.
 constexpr double future = 0.5;  // Time by which an image may be newer than the last step before that is worth a word [s].
 
 using Clock = std::chrono::steady_clock;
 double since(Clock::time_point& mark) noexcept {
   const Clock::time_point now = Clock::now();
   return std::chrono::duration<double>(now - std::exchange(mark, now)).count();
+}
+
+/// Whether an image shows nothing of an arm that it should show: one of another unit, place or time, which says nothing of what is free.
+bool sees_through(const ArmResidual& arm) noexcept {
+  return arm.rays >= least_rays && arm.through_share() > sees_nothing_of_arm;
 }
 
 /// Share of the pixels that show something.
@@ -96,6 +102,13 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   const Eigen::Isometry3d X_WC = placed(now).X_WC;
   view.mask.mark(view.camera, view.rays, placed(before), placed(now), placed(after), view.image);
   report.mask_time = since(mark);
+  if (sees_through(view.mask.residual())) {
+    report.arm = view.mask.residual();
+    report.question =
+        "camera '" + view.camera.name +
+        "': its image sees through the arm and is not used; check the unit of depth, the camera's pose and the times of its images";
+    return report;
+  }
   const SeenImage seen{view.camera, view.rays, X_WC, view.image, view.mask.front(), static_cast<std::uint8_t>(number), time};
   map.add(seen);
   report.map_time = since(mark);

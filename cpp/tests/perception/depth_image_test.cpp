@@ -61,12 +61,14 @@ BOOST_FIXTURE_TEST_CASE(ranges_and_what_is_nothing, Taken) {
   at(30, 10) = std::numeric_limits<float>::quiet_NaN();
   at(40, 10) = std::numeric_limits<float>::infinity();
   at(50, 10) = 1e30f;
+  at(60, 10) = 850.0f;  // in millimetres
   take();
   BOOST_TEST((label(10, 10) == PixelLabel::nothing));
   BOOST_TEST((label(20, 10) == PixelLabel::outside));
   BOOST_TEST((label(30, 10) == PixelLabel::nothing));
   BOOST_TEST((label(40, 10) == PixelLabel::nothing));
   BOOST_TEST((label(50, 10) == PixelLabel::nothing));
+  BOOST_TEST((label(60, 10) == PixelLabel::nothing));
 }
 
 BOOST_FIXTURE_TEST_CASE(whole_numbers_have_a_unit, Taken) {

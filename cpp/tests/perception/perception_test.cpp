@@ -203,6 +203,27 @@ BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {
   BOOST_TEST(controller.obstacles_of("front") == nullptr);
 }
 
+BOOST_FIXTURE_TEST_CASE(an_image_that_sees_through_the_arm_is_not_used, Watched) {
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 480.0;
+  camera.cx = 319.5;
+  camera.cy = 239.5;
+  start();
+  step();
+  BOOST_TEST(look().used);
+  std::vector<float> pixels = scene.image(camera);
+  for (float& z : pixels) {
+    z *= 10.0f;  // a unit that is wrong by ten
+  }
+  const int before = points("front", {0.2, 0.9, 0.5}, 0.17);
+  const PerceptionReport report =
+      perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  BOOST_TEST(!report.used);
+  BOOST_TEST(report.question.find("sees through the arm") != std::string::npos);
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == before);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_is_gone_is_gone_for_the_controller, Watched) {
   start();
   step();
