@@ -47,7 +47,7 @@ def frame(depth: np.ndarray, at: float, camera: str = "front") -> Frame:
 def test_a_frame_is_taken_with_all_that_its_source_says(arm: Arm, depth: np.ndarray) -> None:
     watched = Watched(arm, steps=1)
     moved = CAMERA.pose.copy()
-    moved[:3, 3] += [0.0, 0.1, 0.0]
+    moved[:3, 3] += [0.0, 0.01, 0.0]
     report = take(watched.perception, Frame("front", 7.0, depth, 0.001, q=arm.neutral, pose=moved))
     assert report.used  # although step has never been there
     assert np.array_equal(watched.perception.pose("front"), moved)
