@@ -75,6 +75,7 @@ def test_the_arm_goes_by_what_a_camera_sees(studio: Studio, looker: Looker) -> N
 @pytest.mark.usefixtures("camera")
 def test_the_camera_stands_where_somebody_looks_from(studio: Studio, looker: Looker) -> None:
     looker.tab("Camera")
+    until(lambda: not looker.is_checked("depth camera"), "the end of the camera before, on the page")
     looker.check("depth camera")
     until(lambda: last(studio).camera.choice is not None, "the camera")
     looker.press("Place it where I look from")
