@@ -94,10 +94,6 @@ void Controller::move_obstacle(const std::string& name, const Eigen::Isometry3d&
 void Controller::remove_obstacle(const std::string& name, const std::string& source) {
   change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.remove(name, source); });
 }
-std::shared_ptr<const Obstacles> Controller::obstacles_of(const std::string& source) const {
-  const std::lock_guard lock(setters_);
-  return registry_->said(source);
-}
 std::vector<SourceContent> Controller::said() const {
   const std::lock_guard lock(setters_);
   return registry_->said();

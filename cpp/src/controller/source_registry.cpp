@@ -112,16 +112,9 @@ class Groups {
 
 SourceRegistry::SourceRegistry(const ControllerSettings& settings) : settings_(settings) {}
 
-const SourceRegistry::Entry* SourceRegistry::find(const std::string& source) const noexcept {
+SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept {
   const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.set.name == source; });
   return found == entries_.end() ? nullptr : &*found;
-}
-SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept {
-  return const_cast<Entry*>(std::as_const(*this).find(source));
-}
-std::shared_ptr<const Obstacles> SourceRegistry::said(const std::string& source) const noexcept {
-  const Entry* const entry = find(source);
-  return entry == nullptr ? nullptr : entry->set.points;
 }
 
 std::vector<SourceContent> SourceRegistry::said() const {
@@ -192,7 +185,7 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
     ++number_;
     return;
   }
-  const bool believed = obstacles.size() > 0 || entry.given.size() == 0 ||
+  const bool believed = obstacles.size() > 0 || entry.given.size() == 0 || options.as_given ||
                         (entry.set.emptied && time - entry.emptied_at >= settings_.sources.empty_after);
   if (believed) {
     const bool comes = options.source != SourceOptions::scene || !same;  // a scene that is set again and again may rest
@@ -236,7 +229,7 @@ void SourceRegistry::replace(Entry& entry, Obstacles obstacles, const SourceOpti
   entry.set.time = entry.set.heard = options.time;
   entry.set.emptied = entry.set.repeated = false;
   entry.set.valid_for = entry.set.moves_for = validity(entry, options);
-  if (!std::isnan(time) && !std::isinf(options.valid_for) && options.finds_velocities) {
+  if (!std::isnan(time) && !std::isinf(options.valid_for) && !options.as_given) {
     find_velocities(entry, before, last, time, !std::isnan(options.time));
   }
 }

@@ -33,8 +33,6 @@ class SourceRegistry {
   /// Removes a named group. Where it was the last one the source is empty, which is believed.
   void remove(const std::string& name, const std::string& source);
 
-  /// What a source said last; null: there is none of the name.
-  std::shared_ptr<const Obstacles> said(const std::string& source) const noexcept;
   /// What all sources said last.
   std::vector<SourceContent> said() const;
   /// All sources, as a step takes them.
@@ -52,7 +50,6 @@ class SourceRegistry {
   };
 
   Entry* find(const std::string& source) noexcept;
-  const Entry* find(const std::string& source) const noexcept;
   Entry& at(const std::string& source);
   Entry& at_or_new(const std::string& source);
   /// Notes that a source was set at a time [s].

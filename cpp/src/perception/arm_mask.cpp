@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "../math/kernels/in_use.hpp"
+#include "grown_shape.hpp"
 #include "kernels/image_kernel.hpp"
 
 namespace sidestep {
@@ -88,10 +89,7 @@ void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const ArmI
     const Eigen::Matrix3d R = X_CW.linear() * link.R_WL;
     const Eigen::Matrix3d shape = R * ellipsoid.shape * R.transpose();
     const double growth = growth_[k] = growth_of(ellipsoid, camera, before, now, after);
-    const double mean_axis = std::sqrt(shape.trace() / 3.0);
-    const Eigen::Matrix3d grown =
-        (1.0 + growth / mean_axis) * shape + (growth + mean_axis) * growth * Eigen::Matrix3d::Identity();
-    mark(see(centre, grown, rays), camera, rays, image);
+    mark(see(centre, grown_shape(shape, growth), rays), camera, rays, image);
     cores_.push_back(see(centre, core_share * core_share * shape, rays));
   }
   PixelLabel* const labels = image.labels();

@@ -2,12 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 #include "impl.hpp"
 #include "nearby.hpp"
-#include "reach.hpp"
 
 namespace sidestep {
 namespace {
@@ -18,9 +16,6 @@ constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape e
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
-Eigen::Vector3d low_of(const Voxel& voxel) { return {voxel.low[0], voxel.low[1], voxel.low[2]}; }
-Eigen::Vector3d high_of(const Voxel& voxel) { return {voxel.high[0], voxel.high[1], voxel.high[2]}; }
-Eigen::Vector3d centre_of(const Voxel& voxel) { return 0.5 * (low_of(voxel) + high_of(voxel)); }
 }  // namespace
 
 void Perception::Impl::add_unseen(const SeenImage& seen) {
@@ -33,10 +28,10 @@ void Perception::Impl::add_unseen(const SeenImage& seen) {
     unseen_time = seen.time;
     border = unseen->border(seen.time);
     const Eigen::Index num = border.cols();
-    tell(unseen_source,
-         num == 0 ? Obstacles::none()
-                  : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
-         {unseen_source, SourceOptions::untold, ever, false});
+    controller.set_obstacles(
+        num == 0 ? Obstacles::none()
+                 : Obstacles(border, Eigen::VectorXd::Constant(num, unseen->radius()), Eigen::Matrix3Xd::Zero(3, num)),
+        {unseen_source, SourceOptions::untold, ever, true});
   }
 }
 
@@ -63,8 +58,8 @@ void Perception::Impl::find_told(double time) {
 bool Perception::Impl::is_explained(std::size_t number) {
   const Voxel& voxel = map.voxels()[number];
   Tested& last = tested[number];
-  const bool has_grown = (low_of(voxel) - Eigen::Vector3f(last.low).cast<double>()).minCoeff() < -grown ||
-                         (high_of(voxel) - Eigen::Vector3f(last.high).cast<double>()).maxCoeff() > grown;
+  const bool has_grown = (voxel.low_corner() - Eigen::Vector3f(last.low).cast<double>()).minCoeff() < -grown ||
+                         (voxel.high_corner() - Eigen::Vector3f(last.high).cast<double>()).maxCoeff() > grown;
   if (last.cell == voxel.cell && last.version == told_version && !has_grown) {
     return last.is_explained;
   }
@@ -73,10 +68,10 @@ bool Perception::Impl::is_explained(std::size_t number) {
   last.cell = voxel.cell;
   last.version = told_version;
   const View& view = views[voxel.camera];
-  const Eigen::Vector3d centre = centre_of(voxel);
+  const Eigen::Vector3d centre = voxel.middle();
   const double depth = (centre - view.X_WC.translation()).norm();
   const double error = static_cast<double>(voxel.error) + noise_explained * view.camera.noise.sigma(depth);
-  const double thin = 0.5 * (high_of(voxel) - low_of(voxel)).minCoeff();
+  const double thin = 0.5 * (voxel.high_corner() - voxel.low_corner()).minCoeff();
   last.is_explained = std::any_of(told.begin(), told.end(), [&](const std::shared_ptr<const Obstacles>& shapes) {
     return distance_to(*shapes, centre, error + 1e-6) + thin <= error;
   });
@@ -86,8 +81,8 @@ bool Perception::Impl::is_explained(std::size_t number) {
 bool Perception::Impl::is_left_out(const Voxel& voxel) const {
   for (const Region& region : regions) {
     const Eigen::Vector3d centre =
-        region.frame < 0 ? centre_of(voxel)
-                         : Eigen::Vector3d(frame_pose(arm->robot(), now, region.frame).inverse() * centre_of(voxel));
+        region.frame < 0 ? voxel.middle()
+                         : Eigen::Vector3d(frame_pose(arm->robot(), now, region.frame).inverse() * voxel.middle());
     if (distance_to(region.balls, centre, region.grow + 1e-6) <= region.grow) {
       return true;
     }
@@ -95,18 +90,9 @@ bool Perception::Impl::is_left_out(const Voxel& voxel) const {
   return false;
 }
 
-void Perception::Impl::tell(const std::string& source, Obstacles obstacles, const SourceOptions& options) {
-  const std::shared_ptr<const Obstacles> before = controller.obstacles_of(source);
-  if (obstacles.size() == 0 && before != nullptr && before->size() > 0) {
-    controller.remove_obstacles(source);  // nothing is there, as images show: no need to wait for more
-  }
-  controller.set_obstacles(std::move(obstacles), options);
-}
-
 CellBall Perception::Impl::ball_of(const Voxel& voxel, bool moved) const {
   // The middle of what the last image shows moves with it; the ball holds what images before have shown, too.
-  const Eigen::Vector3d middle = 0.5 * (Eigen::Vector3f(voxel.frame_low) + Eigen::Vector3f(voxel.frame_high)).cast<double>();
-  CellBall ball = ball_behind(moved ? middle : centre_of(voxel), low_of(voxel), high_of(voxel),
+  CellBall ball = ball_behind(moved ? voxel.frame_middle() : voxel.middle(), voxel.low_corner(), voxel.high_corner(),
                               views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
   ball.radius += static_cast<double>(voxel.error);
   return ball;
@@ -199,11 +185,11 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     }
   }
   if (remembered != last_remembered) {  // boxes of what is not seen do not change
-    tell(memory_source, balls(remembered, false), {memory_source, SourceOptions::untold, ever, false});
+    controller.set_obstacles(balls(remembered, false), {memory_source, SourceOptions::untold, ever, true});
     last_remembered.swap(remembered);
   }
   View& view = views[number];
-  tell(view.camera.name, moving_balls(view, time), {view.camera.name, time, settings.valid_for, false});
+  controller.set_obstacles(moving_balls(view, time), {view.camera.name, time, settings.valid_for, true});
   report.seen = static_cast<int>(shown.size());
   report.remembered = static_cast<int>(last_remembered.size());
   report.unseen = static_cast<int>(border.cols());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cell_ball.hpp"
+#include "reach.hpp"
 #include "sidestep/perception/perception.hpp"
 #include "sidestep/perception/unseen_space.hpp"
 #include "sidestep/scene/velocity_estimate.hpp"
@@ -60,8 +61,6 @@ struct Perception::Impl {
   void judge(View& view, PerceptionReport& report) const;
   /// Gives the controller what the camera shows, and what no camera shows now.
   void hand_over(std::size_t number, double time, PerceptionReport& report);
-  /// Replaces what a source says. Without obstacles that is believed at once: it comes from images that show something.
-  void tell(const std::string& source, Obstacles obstacles, const SourceOptions& options);
   /// The ball of a voxel; `moved`: around what the last image alone shows.
   CellBall ball_of(const Voxel& voxel, bool moved) const;
   /// Those of several, with their velocities where they have moved.
@@ -85,6 +84,7 @@ struct Perception::Impl {
   std::vector<View> views;
   Eigen::VectorXd zero;
   KinematicState before, now, after;
+  Reach reach;
   VoxelMap map;
   std::optional<UnseenSpace> unseen;
   double unseen_time = -std::numeric_limits<double>::infinity();  // Time at which its border was found [s].

@@ -31,12 +31,6 @@ bool sees_through(const ArmResidual& arm) noexcept {
   return arm.rays >= least_rays && arm.through_share() > sees_nothing_of_arm;
 }
 
-/// Share of the pixels that show something.
-double valid_share(const DepthImage& image) noexcept {
-  const auto nothing = std::count(image.labels(), image.labels() + image.size(), PixelLabel::nothing);
-  return 1.0 - static_cast<double>(nothing) / static_cast<double>(image.size());
-}
-
 }  // namespace
 
 Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras, const PerceptionSettings& settings)
@@ -91,7 +85,7 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   Clock::time_point mark = Clock::now();
   take(view.camera, view.image);
   report.depth_time = since(mark);
-  if (valid_share(view.image) < least_valid_share) {
+  if (view.image.count(PixelLabel::nothing) > (1.0 - least_valid_share) * static_cast<double>(view.image.size())) {
     report.question =
         "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
     return report;
@@ -180,12 +174,9 @@ void Perception::Impl::judge(View& view, PerceptionReport& report) const {
         std::to_string(static_cast<int>(std::lround(100.0 * view.through))) +
         " % of the rays that should meet it pass; check the camera's pose and the times of its images (sidestep camera check)";
   }
-  for (std::size_t i = 0; i < view.image.size(); ++i) {
-    const PixelLabel label = view.image.labels()[i];
-    report.obstacle_pixels += label == PixelLabel::obstacle ? 1 : 0;
-    report.arm_pixels += label == PixelLabel::arm ? 1 : 0;
-    report.edge_pixels += label == PixelLabel::edge ? 1 : 0;
-  }
+  report.obstacle_pixels = view.image.count(PixelLabel::obstacle);
+  report.arm_pixels = view.image.count(PixelLabel::arm);
+  report.edge_pixels = view.image.count(PixelLabel::edge);
 }
 
 void Perception::leave_out(const std::string& name, const Obstacles& region, double grow, const std::string& link) {

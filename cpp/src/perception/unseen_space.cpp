@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "grown_shape.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -59,9 +61,7 @@ void UnseenSpace::add(const SeenImage& seen) noexcept {
 }
 
 void UnseenSpace::add_arm(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, double time) noexcept {
-  const double around = edge_ * std::sqrt(3.0);
-  const double mean = std::sqrt(shape.trace() / 3.0);
-  const Eigen::Matrix3d grown = (1.0 + around / mean) * shape + (around + mean) * around * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d grown = grown_shape(shape, edge_ * std::sqrt(3.0));
   const Eigen::Matrix3d inverse = grown.inverse();
   const Eigen::Vector3d half = grown.diagonal().cwiseSqrt();
   Eigen::Vector3i first, last;

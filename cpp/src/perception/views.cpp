@@ -3,18 +3,8 @@
 #include <utility>
 
 #include "impl.hpp"
-#include "reach.hpp"
 
 namespace sidestep {
-namespace {
-
-VoxelMap make_map(const Arm& arm, const PerceptionSettings& settings) {
-  const Reach reach = reach_of(arm);
-  return VoxelMap(reach.centre, reach.radius, settings);
-}
-
-}  // namespace
-
 Perception::Impl::View::View(const DepthCamera& its, const Arm& arm)
     : camera(its),
       rays(its),
@@ -31,13 +21,13 @@ Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras,
       before(arm->robot()),
       now(arm->robot()),
       after(arm->robot()),
-      map(make_map(*arm, chosen)) {
+      reach(reach_of(*arm)),
+      map(reach.centre, reach.radius, chosen) {
   views.reserve(cameras.size());
   for (const DepthCamera& camera : cameras) {
     views.emplace_back(camera, *arm);
   }
   if (!settings.unseen_is_free) {
-    const Reach reach = reach_of(*arm);
     unseen.emplace(reach.centre, reach.radius, settings);
   }
 }

@@ -96,7 +96,6 @@ void VoxelMap::add_points(const SeenImage& seen) {
   Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(X_WC.R) = seen.X_WC.linear().cast<float>();
   Eigen::Map<Eigen::Vector3f>(X_WC.t) = seen.X_WC.translation().cast<float>();
   const int width = seen.image.width();
-  num_outside_ = 0;
   for (int v = 0; v < seen.image.height(); ++v) {
     const auto row = static_cast<std::ptrdiff_t>(v) * width;
     kernel.place(X_WC, seen.rays.x() + row, seen.rays.y() + row, seen.image.depth() + row, width, row_x_.data(), row_y_.data(),
@@ -113,7 +112,6 @@ void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
   for (std::size_t u = 0; u < width;) {
     const int cell = cells[u];
     if (labels[u] != PixelLabel::obstacle || cell < 0) {
-      num_outside_ += labels[u] == PixelLabel::obstacle ? 1 : 0;
       ++u;
       continue;
     }
@@ -156,22 +154,20 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
           std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks_by * (voxel.frame_high[axis] - voxel.high[axis]));
     }
   }
-  const Eigen::Vector3d middle(voxel.low[0], voxel.low[1], voxel.low[2]);
-  const double pixel = (middle - seen.X_WC.translation()).norm() / std::min(seen.camera.fx, seen.camera.fy);
+  const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();
+  const double pixel = distance / std::min(seen.camera.fx, seen.camera.fy);
   const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
   voxel.counts =
       voxel.counts || voxel.pixels >= std::max<double>(settings_.least_pixels, least_share * all_pixels) || shown_again;
   voxel.shown_by |= bit(seen.number);
-  voxel.error = static_cast<float>(seen.camera.translation_error +
-                                   seen.camera.rotation_error * (middle - seen.X_WC.translation()).norm());
+  voxel.error = static_cast<float>(seen.camera.translation_error + seen.camera.rotation_error * distance);
   voxel.last = std::max(voxel.last, seen.time);
   voxel.free_images = voxel.missed_images = 0;
   voxel.is_hidden = false;
 }
 
 VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {
-  const Eigen::Vector3d middle = X_CW * (0.5 * (Eigen::Vector3d(voxel.low[0], voxel.low[1], voxel.low[2]) +
-                                                Eigen::Vector3d(voxel.high[0], voxel.high[1], voxel.high[2])));
+  const Eigen::Vector3d middle = X_CW * voxel.middle();
   const double edge = this->edge(voxel), half = half_diagonal * edge;
   if (middle.z() <= seen.camera.near + half) {
     return Sight::elsewhere;
@@ -236,8 +232,7 @@ bool VoxelMap::is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const 
   if (voxel.last - voxel.first > background_after) {
     return true;
   }
-  const Eigen::Vector3d middle(0.5 * (voxel.low[0] + voxel.high[0]), 0.5 * (voxel.low[1] + voxel.high[1]),
-                               0.5 * (voxel.low[2] + voxel.high[2]));
+  const Eigen::Vector3d middle = voxel.middle();
   const double depth = (middle - eye).norm(), edge = this->edge(voxel), reach = edge + settled_noise * noise.sigma(depth);
   const Eigen::Vector3d along = (middle - eye) / std::max(depth, 1e-6);
   for (double step = edge; step <= reach; step += edge) {

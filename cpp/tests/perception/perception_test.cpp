@@ -46,9 +46,18 @@ struct Watched {
     step();
     return report;
   }
+  /// What a source said last; null: nothing.
+  std::shared_ptr<const Obstacles> said(const std::string& source) const {
+    for (const SourceContent& content : controller.said()) {
+      if (content.name == source) {
+        return content.obstacles;
+      }
+    }
+    return nullptr;
+  }
   /// Number of points of a source within a distance of a place.
   int points(const std::string& source, const Eigen::Vector3d& place, double distance) const {
-    const auto set = controller.obstacles_of(source);
+    const auto set = said(source);
     return set == nullptr ? -1
                           : static_cast<int>(((set->points().colwise() - place).colwise().norm().array() < distance).count());
   }
@@ -57,14 +66,14 @@ struct Watched {
 BOOST_FIXTURE_TEST_CASE(an_image_gives_obstacles_without_the_arm, Watched) {
   start();
   BOOST_TEST(!look(Capture{time, {}, std::nullopt}).used);
-  BOOST_TEST(controller.obstacles_of("front") == nullptr);
+  BOOST_TEST(said("front") == nullptr);
   step();
   const PerceptionReport report = look();
   BOOST_TEST(report.used);
   BOOST_TEST(report.question == "");
   BOOST_TEST(report.arm_pixels > 200);
   BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) > 20);
-  const auto set = controller.obstacles_of("front");
+  const auto set = said("front");
   BOOST_REQUIRE(set != nullptr);
   const KinematicState state = test::state_at(arm.robot(), q);
   int on_arm = 0;
@@ -200,7 +209,7 @@ BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {
       perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
   BOOST_TEST(!report.used);
   BOOST_TEST(report.question.find("sees nothing") != std::string::npos);
-  BOOST_TEST(controller.obstacles_of("front") == nullptr);
+  BOOST_TEST(said("front") == nullptr);
 }
 
 BOOST_FIXTURE_TEST_CASE(an_image_that_sees_through_the_arm_is_not_used, Watched) {

@@ -42,8 +42,7 @@ struct Mapped {
     int num = 0;
     for (const Voxel& voxel : map.voxels()) {
       if (voxel.cell >= 0 && voxel.counts) {
-        const Eigen::Vector3d low(voxel.low[0], voxel.low[1], voxel.low[2]), high(voxel.high[0], voxel.high[1], voxel.high[2]);
-        num += (0.5 * (low + high) - point).norm() < distance ? 1 : 0;
+        num += (voxel.middle() - point).norm() < distance ? 1 : 0;
       }
     }
     return num;

@@ -134,8 +134,6 @@ class Controller {
   void move_obstacle(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options = {});
   /// Removes what has a name, at once.
   void remove_obstacle(const std::string& name, const std::string& source = SourceOptions::scene);
-  /// What a source said last, as it was given; null: nothing. From any thread.
-  std::shared_ptr<const Obstacles> obstacles_of(const std::string& source) const;
   /// What all sources said last. From any thread.
   std::vector<SourceContent> said() const;
   /// What is believed of each source. Only for the thread of `step`; allocates.

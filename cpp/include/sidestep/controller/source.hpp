@@ -18,7 +18,9 @@ struct SourceOptions {
   /// Age up to which it is believed [s]; inf: for ever; NaN: SourceSettings::valid_for where it was given a time or has velocities, or
   /// where such sets came three times within that; else ControllerSettings::obstacle_timeout.
   double valid_for = untold;
-  bool finds_velocities = true;  ///< Velocities that are not told are found from set to set, where sets come again and again.
+  /// The set is taken as it is: an empty one is believed at once, and velocities that are not told are not sought. For a source that has
+  /// judged both itself.
+  bool as_given = false;
 };
 
 /// What a source said last, as it was given.

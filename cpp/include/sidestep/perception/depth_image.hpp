@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -46,6 +47,8 @@ class DepthImage {
   const PixelLabel* labels() const noexcept { return labels_.data(); }
   PixelLabel* labels() noexcept { return labels_.data(); }
   std::size_t size() const noexcept { return depth_.size(); }
+  /// Number of pixels that show this.
+  int count(PixelLabel label) const noexcept { return static_cast<int>(std::count(labels_.begin(), labels_.end(), label)); }
 
  private:
   void mark_edges(const DepthCamera& camera) noexcept;

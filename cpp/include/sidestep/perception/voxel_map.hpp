@@ -29,6 +29,15 @@ struct Voxel {
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool moves;                         ///< What was in it moved when it was seen last.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
+
+  Eigen::Vector3d low_corner() const { return Eigen::Map<const Eigen::Vector3f>(low).cast<double>(); }
+  Eigen::Vector3d high_corner() const { return Eigen::Map<const Eigen::Vector3f>(high).cast<double>(); }
+  /// Middle of its box.
+  Eigen::Vector3d middle() const { return 0.5 * (low_corner() + high_corner()); }
+  /// The same of what the last image alone shows.
+  Eigen::Vector3d frame_middle() const {
+    return 0.5 * (Eigen::Map<const Eigen::Vector3f>(frame_low) + Eigen::Map<const Eigen::Vector3f>(frame_high)).cast<double>();
+  }
 };
 
 /// An image with all that says what its rays have seen.
@@ -77,9 +86,6 @@ class VoxelMap {
   /// Whether a voxel has rested: it has been seen for long, or noise along the ray explains it by one that has.
   bool is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept;
   double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
-  const VoxelGrid& grid() const noexcept { return grid_; }
-  /// Number of points of the last image that were too far away.
-  int num_outside() const noexcept { return num_outside_; }
   /// Indices of the voxels that the last image showed.
   const std::vector<int>& touched() const noexcept { return touched_; }
   /// Tells whether what is in a voxel moves: then it is kept for less.
@@ -107,7 +113,6 @@ class VoxelMap {
   std::vector<float> row_x_, row_y_, row_z_;  // Points of a row of pixels [m], in the world.
   std::vector<int> row_cells_;                // Their cells.
   std::uint32_t frame_ = 0;
-  int num_outside_ = 0;
 };
 
 }  // namespace sidestep
