@@ -206,6 +206,10 @@ void Perception::forget() {
   const std::lock_guard lock(impl_->mutex);
   impl_->map.clear();
   impl_->tested.clear();
+  if (impl_->unseen) {
+    impl_->unseen->forget();
+    impl_->unseen_time = -std::numeric_limits<double>::infinity();
+  }
   for (auto& view : impl_->views) {
     view.begin = std::numeric_limits<double>::quiet_NaN();
     view.motion.forget();

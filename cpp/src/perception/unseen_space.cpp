@@ -52,13 +52,15 @@ void UnseenSpace::add(const SeenImage& seen) noexcept {
         if (label == PixelLabel::nothing || label == PixelLabel::edge) {
           continue;
         }
-        if (seen.sees_to(n) > p.z() + half - noise_of_sight * seen.camera.noise.sigma(p.z())) {
+        if (seen.sees_to(n) > p.z() + std::max(0.0, half - noise_of_sight * seen.camera.noise.sigma(p.z()))) {
           seen_[index(i, j, k)] = now;
         }
       }
     }
   }
 }
+
+void UnseenSpace::forget() noexcept { std::fill(seen_.begin(), seen_.end(), never); }
 
 void UnseenSpace::add_arm(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, double time) noexcept {
   const Eigen::Matrix3d grown = grown_shape(shape, edge_ * std::sqrt(3.0));

@@ -141,10 +141,9 @@ void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
 }
 
 void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
-  const bool is_new = voxel.pixels > 0 && !(voxel.high[0] > voxel.low[0]) && !voxel.counts;
   const bool shown_again = voxel.first < seen.time && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
   for (int axis = 0; axis < 3; ++axis) {
-    if (is_new || !(seen.time > voxel.last)) {
+    if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
       voxel.low[axis] = voxel.frame_low[axis];
       voxel.high[axis] = voxel.frame_high[axis];
     } else {

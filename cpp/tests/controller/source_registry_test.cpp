@@ -140,6 +140,21 @@ BOOST_AUTO_TEST_CASE(named_shapes_are_added_moved_and_removed_one_by_one) {
   BOOST_TEST(said.registry.world().obstacles.size() == 5);
 }
 
+BOOST_AUTO_TEST_CASE(a_source_that_has_judged_itself_is_taken_as_it_is) {
+  Said said;
+  SourceRegistry& all = said.registry;
+  for (int k = 0; k < 6; ++k) {  // it moves at 1 m/s, and says that it rests
+    all.set(one_ball(0.1 * k), {.source = "camera", .time = 0.1 * k, .as_given = true}, 0.1 * k);
+  }
+  BOOST_TEST(all.world().obstacles.size() == 1);
+  BOOST_TEST(all.world().obstacles.velocities().norm() == 0.0);
+  all.set(Obstacles::none(), {.source = "camera", .time = 0.6, .as_given = true}, 0.6);
+  BOOST_TEST(all.world().obstacles.size() == 0);
+  all.set(one_ball(1.0), {.source = "camera", .time = 0.7}, 0.7);
+  all.set(Obstacles::none(), {.source = "camera", .time = 0.8}, 0.8);
+  BOOST_TEST(all.world().obstacles.size() == 1);  // another that empties is doubted
+}
+
 BOOST_AUTO_TEST_CASE(what_is_refused_says_what_is_allowed_and_changes_nothing) {
   Said said;
   said.registry.set(two_balls(), {}, 0.0);

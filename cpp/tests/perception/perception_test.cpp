@@ -252,6 +252,10 @@ BOOST_FIXTURE_TEST_CASE(unseen_space_is_an_obstacle_if_it_is_closed, Watched) {
   BOOST_TEST(report.unseen > 100);
   BOOST_TEST(points("unseen", {0.0, 0.0, 0.6}, 3.0) == report.unseen);
   BOOST_TEST(perception->unseen().cols() == report.unseen);
+  const int looked = report.unseen;
+  perception->forget();
+  look(Capture{time, Eigen::Vector4d(0.0, 2.4, 0.0, 0.0), std::nullopt});  // with the arm elsewhere in mind
+  BOOST_TEST(perception->unseen().cols() != looked);
 }
 
 BOOST_FIXTURE_TEST_CASE(wrong_calls_name_what_is_allowed, Watched) {

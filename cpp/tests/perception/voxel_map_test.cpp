@@ -213,6 +213,18 @@ BOOST_FIXTURE_TEST_CASE(unseen_space_is_what_no_ray_has_passed, Mapped) {
   }
   BOOST_TEST(behind > 5);
   BOOST_TEST(in_front == 0);
+  camera.noise = {0.05,
+                  0.0};  // three standard deviations are more than a cell: it must be seen through to its middle all the same
+  UnseenSpace noisy(Eigen::Vector3d(0.0, 0.0, 0.5), 0.5, settings);
+  noisy.add(seen());
+  int behind_ball = 0;
+  const Eigen::Matrix3Xd noisy_border = noisy.border(time);
+  for (Eigen::Index n = 0; n < noisy_border.cols(); ++n) {
+    behind_ball += (noisy_border.col(n) - Eigen::Vector3d(0.06, 0.0, 0.5)).cwiseAbs().maxCoeff() < 0.05 ? 1 : 0;
+  }
+  BOOST_TEST(behind_ball > 0);  // just behind the front of the ball, at x = 0.1
   space.add_arm({-0.25, 0.0, 0.5}, 0.15 * 0.15 * Eigen::Matrix3d::Identity(), time);
   BOOST_TEST(space.seen_share(time) > share);
+  space.forget();
+  BOOST_TEST(space.seen_share(time) == 0.0);
 }

@@ -18,6 +18,8 @@ class UnseenSpace {
 
   /// Adds what an image saw through. No allocation.
   void add(const SeenImage& seen) noexcept;
+  /// Nobody has looked anywhere.
+  void forget() noexcept;
   /// The arm is inside of this ellipsoid {p : (p - c)ᵀ S⁻¹ (p - c) <= 1}, S in the world: it counts as seen, with a cell around it.
   void add_arm(const Eigen::Vector3d& centre, const Eigen::Matrix3d& shape, double time) noexcept;
 
