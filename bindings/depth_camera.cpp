@@ -126,6 +126,22 @@ void bind_depth_camera(nb::module_& m) {
       .def_ro("translation_error", &DepthCamera::translation_error, "Error of the pose [m].")
       .def_ro("rotation_error", &DepthCamera::rotation_error, "Error of the pose [rad].")
       .def_ro("clock_error", &DepthCamera::clock_error, "Error of times of capture [s].")
+      .def("replace",
+           [](nb::handle self, const nb::kwargs& changes) {
+             nb::dict all;
+             for (const char* const name : {"width", "height", "fx", "fy", "cx", "cy", "pose", "link", "distortion_model", "distortion", "noise",
+                                            "near", "far", "translation_error", "rotation_error", "clock_error"}) {
+               all[name] = self.attr(name);
+             }
+             all.update(changes);
+             const nb::object name = all.contains("name") ? nb::borrow(all["name"]) : nb::object(self.attr("name"));
+             if (all.contains("name")) {
+               nb::del(all["name"]);
+             }
+             return nb::type<DepthCamera>()(name, **nb::borrow<nb::kwargs>(all));
+           },
+           nb::sig("def replace(self, **changes: typing.Any) -> DepthCamera"),
+           "The same camera but for some values, by the names of its arguments. Raises as it does.")
       .def("project",
            [](const DepthCamera& c, nb::handle points) {
              const Eigen::Matrix3Xd p = as_points(points, "points");

@@ -3884,6 +3884,11 @@ class DepthCamera:
     def clock_error(self) -> float:
         """Error of times of capture [s]."""
 
+    def replace(self, **changes: Any) -> DepthCamera:
+        """
+        The same camera but for some values, by the names of its arguments. Raises as it does.
+        """
+
     def project(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image.

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from sidestep import Arm, Controller, ControllerSettings
-from sidestep.perception import Perception
+from sidestep.math.pose import pose_at
+from sidestep.perception import DepthCamera, DepthNoise, Perception
 from support.camera_scene import CAMERA, rendered
 
 
@@ -55,3 +56,18 @@ def test_a_report_says_what_became_of_its_image(arm: Arm, perception: Perception
         "PerceptionReport(used=False, seen=0, remembered=0, explained=0, unseen=0, question=\"camera 'front' sees "
         'nothing: fewer than 1 % of its pixels have a depth; the image is not used")'
     )
+
+
+def test_a_camera_is_replaced_by_one_with_other_values() -> None:
+    noise = DepthNoise(0.002, 0.001)
+    camera = DepthCamera(
+        "a", width=10, height=5, fx=10, fy=11, cx=4, cy=2, pose=pose_at([1.0, 2.0, 3.0]), noise=noise
+    )
+    other = camera.replace(far=2.0, link="fr3_hand")
+    assert (other.name, other.far, other.link, other.fy) == ("a", 2.0, "fr3_hand", 11.0)
+    assert (other.noise.constant, other.noise.quadratic) == (0.002, 0.001)
+    assert np.array_equal(other.pose, camera.pose)
+    assert (camera.far, camera.link) == (4.0, "")
+    assert camera.replace(name="b").name == "b"
+    with pytest.raises(ValueError, match="camera 'a': fx is 0"):
+        camera.replace(fx=0.0)

@@ -127,21 +127,7 @@ def cameras_around(
 
 def cameras_like(cameras: Sequence[DepthCamera], *, far: float) -> list[DepthCamera]:
     """Cameras with another range [m]."""
-    return [
-        DepthCamera(
-            camera.name,
-            width=camera.width,
-            height=camera.height,
-            fx=camera.fx,
-            fy=camera.fy,
-            cx=camera.cx,
-            cy=camera.cy,
-            pose=camera.pose,
-            link=camera.link,
-            far=far,
-        )
-        for camera in cameras
-    ]
+    return [camera.replace(far=far) for camera in cameras]
 
 
 class CameraRig:

@@ -233,23 +233,8 @@ def told_camera(
     clock: float = 0.0,
 ) -> DepthCamera:
     """A camera as it is told: where it is believed to be, and by how much that and its clock may be wrong."""
-    return DepthCamera(
-        camera.name,
-        width=camera.width,
-        height=camera.height,
-        fx=camera.fx,
-        fy=camera.fy,
-        cx=camera.cx,
-        cy=camera.cy,
-        distortion_model=camera.distortion_model,
-        distortion=camera.distortion,
-        pose=pose,
-        link=camera.link,
-        noise=noise,
-        far=camera.far,
-        translation_error=translation,
-        rotation_error=rotation,
-        clock_error=clock,
+    return camera.replace(
+        pose=pose, noise=noise, translation_error=translation, rotation_error=rotation, clock_error=clock
     )
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from sidestep.cli.bench_encounters_command import (
+from sidestep.cli.bench_campaign import (
     FileOption,
     RobotsOption,
     ShardOption,

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Controller, Perception, PerceptionReport, PixelLabel
+from sidestep.perception.seen_stages import SeenStages
 from sidestep.studio.camera_choice import NAME, CameraChoice
 from sidestep.studio.camera_process import CameraProcess, Picture, Pose, Setup
-from sidestep.studio.sight import HIDDEN, REMEMBERED, SEEN, Sight
+from sidestep.studio.sight import Sight
 
 Array = npt.NDArray[np.float64]
 
@@ -188,20 +189,19 @@ def sight_of(
     perception: Perception, report: PerceptionReport, number: int, time: float, rendering: float
 ) -> Sight:
     """What the page shows of an image that perception has taken."""
-    cells, labels = perception.cells(), perception.labels(NAME)
-    kinds = np.where(cells["hidden"], HIDDEN, np.where(cells["remembered"], REMEMBERED, SEEN))
-    shares = np.bincount(labels.ravel(), minlength=len(LABELS)) / labels.size
+    stages = SeenStages.of(perception, NAME)
+    shares = np.bincount(stages.labels.ravel(), minlength=len(LABELS)) / stages.labels.size
     return Sight(
         number=number,
         time=time,
-        pose=perception.pose(NAME),
-        depth=perception.depth(NAME).astype(np.float16),
-        labels=labels,
-        centres=cells["centres"].astype(np.float32),
-        radii=cells["radii"].astype(np.float32),
-        kinds=kinds.astype(np.uint8),
-        ages=cells["ages"].astype(np.float32),
-        unseen=perception.unseen().astype(np.float32),
+        pose=stages.pose,
+        depth=stages.depth.astype(np.float16),
+        labels=stages.labels,
+        centres=stages.centres.astype(np.float32),
+        radii=stages.radii.astype(np.float32),
+        kinds=stages.kinds.astype(np.uint8),
+        ages=stages.ages.astype(np.float32),
+        unseen=stages.unseen.astype(np.float32),
         pixels={name: float(shares[value]) for value, name in LABELS.items()},
         explained=report.explained,
         times=(

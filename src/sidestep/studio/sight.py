@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.perception.seen_stages import CELL_KINDS
 from sidestep.studio.camera_choice import CameraChoice
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-SEEN, REMEMBERED, HIDDEN = range(3)  # what a cell is
-KINDS = ("seen", "remembered", "hidden")
+KINDS = CELL_KINDS
+SEEN, REMEMBERED, HIDDEN = range(len(KINDS))  # what a cell is
 STAGES = ("depth and edges", "arm mask", "points and map", "unseen space", "to the controller")
 
 
