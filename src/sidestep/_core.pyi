@@ -4110,14 +4110,14 @@ class PerceptionSettings:
     """
     How what cameras see becomes obstacles.
 
-        voxel [m], default 0.02, allowed 0.005 to 0.1: Edge of the cells in which points are merged, within reach of the arm. Obstacles stand out of surfaces by 0.4 of the edge, and more at edges. Smaller cells stand out less, and cost more.
-        reach_margin [m], default 0.25, allowed 0 to 2: Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is twice and four times as long.
-        view_margin [m], default 2.0, allowed 0 to 5: Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes.
-        memory [s], default 30.0, allowed 0 to inf: Time for which something is kept that was seen and is hidden or out of view now. What moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen. Longer keeps more that is gone.
-        clear_after, default 2, allowed 1 to 10: Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later.
-        least_pixels, default 3, allowed 1 to 100: Number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it. More is safer against noise, and sees thin things later.
-        unseen_is_free, default True, allowed 0 to 1: Whether space that no camera has seen yet counts as free. Otherwise the arm does not enter it: it keeps clear of what nobody has looked at, and reaches less.
-        valid_for [s], default 0.25, allowed 0.001 to inf: Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images.
+        voxel [m], default 0.02, allowed 0.005 to 0.1: edge of the cells in which points are merged, within reach of the arm: smaller cells stand out of surfaces less (by 0.4 of the edge, more at edges), and cost more
+        reach_margin [m], default 0.25, allowed 0 to 2: distance beyond the reach of the arm up to which cells are as fine as voxel; beyond, their edge is twice and four times as long: larger is finer farther out, and costs more
+        view_margin [m], default 2.0, allowed 0 to 5: distance beyond the reach of the arm up to which things are seen: smaller is faster, and sees later what comes
+        memory [s], default 30.0, allowed 0 to inf: time for which something is kept that is hidden or out of view now; what moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen: longer keeps more that is gone
+        clear_after, default 2, allowed 1 to 10: number of images in a row that must see through a cell before what was there is gone: more is safer against flicker, and clears later
+        least_pixels, default 3, allowed 1 to 100: number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it: more makes fewer ghosts, and shows thin things later
+        unseen_is_free, default True, allowed 0 to 1: space that no camera has seen yet counts as free; without it the arm keeps clear of what nobody has looked at, and reaches less
+        valid_for [s], default 0.25, allowed 0.001 to inf: age up to which the image of a camera is believed; then the arm stops until the next one comes: longer bridges more lost images
 
     Raises ValueError that names the setting, its value and what is allowed.
     """

@@ -10,21 +10,21 @@ const std::vector<Field<PerceptionSettings>>& fields() {
   constexpr double inf = std::numeric_limits<double>::infinity();
   static const std::vector<Field<S>> all{
       {"voxel", &S::voxel, "m", 0.005, 0.1,
-       "Edge of the cells in which points are merged, within reach of the arm. Obstacles stand out of surfaces by 0.4 of the edge, and more at edges. Smaller cells stand out less, and cost more."},
+       "edge of the cells in which points are merged, within reach of the arm: smaller cells stand out of surfaces less (by 0.4 of the edge, more at edges), and cost more"},
       {"reach_margin", &S::reach_margin, "m", 0.0, 2.0,
-       "Distance beyond the reach of the arm up to which cells are as fine as `voxel`; beyond, their edge is twice and four times as long."},
+       "distance beyond the reach of the arm up to which cells are as fine as voxel; beyond, their edge is twice and four times as long: larger is finer farther out, and costs more"},
       {"view_margin", &S::view_margin, "m", 0.0, 5.0,
-       "Distance beyond the reach of the arm up to which things are seen. Less is faster, and sees later what comes."},
+       "distance beyond the reach of the arm up to which things are seen: smaller is faster, and sees later what comes"},
       {"memory", &S::memory, "s", 0.0, inf,
-       "Time for which something is kept that was seen and is hidden or out of view now. What moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen. Longer keeps more that is gone."},
+       "time for which something is kept that is hidden or out of view now; what moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen: longer keeps more that is gone"},
       {"clear_after", &S::clear_after, "-", 1, 10,
-       "Number of images that must see through a cell before what was seen there is gone. More is safer against flicker, and clears later."},
+       "number of images in a row that must see through a cell before what was there is gone: more is safer against flicker, and clears later"},
       {"least_pixels", &S::least_pixels, "-", 1, 100,
-       "Number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it. More is safer against noise, and sees thin things later."},
+       "number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it: more makes fewer ghosts, and shows thin things later"},
       {"unseen_is_free", &S::unseen_is_free, "-", 0, 1,
-       "Whether space that no camera has seen yet counts as free. Otherwise the arm does not enter it: it keeps clear of what nobody has looked at, and reaches less."},
+       "space that no camera has seen yet counts as free; without it the arm keeps clear of what nobody has looked at, and reaches less"},
       {"valid_for", &S::valid_for, "s", 0.001, inf,
-       "Age up to which the image of a camera is believed; then the arm stops until the next one comes. Longer bridges more lost images."},
+       "age up to which the image of a camera is believed; then the arm stops until the next one comes: longer bridges more lost images"},
   };
   return all;
 }

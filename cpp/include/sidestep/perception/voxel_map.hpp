@@ -79,7 +79,8 @@ class VoxelMap {
     const int cell = grid_.cell(p);
     return cell < 0 ? -1 : index_[static_cast<std::size_t>(cell)];
   }
-  /// Whether a voxel is beyond what is as fine as `voxel`, and has been seen for so long that it rests: nothing to an arm that is out of reach.
+  /// Whether a voxel lies outside of the fine cells and has been seen for longer than `background_after`: it rests where the arm does not get,
+  /// so that the controller need not know it.
   bool is_background(const Voxel& voxel) const noexcept {
     return grid_.level(voxel.cell) > 0 && voxel.last - voxel.first > background_after;
   }
