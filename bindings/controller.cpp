@@ -135,7 +135,7 @@ void bind_command(nb::module_& m) {
   nb::enum_<Activity>(m, "Activity", "What a controller is doing.")
       .value("no_goal", Activity::no_goal, "No goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles.")
       .value("moving", Activity::moving, "On the way to its goal, or following a velocity, twist or trajectory.")
-      .value("waiting", Activity::waiting, "Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`.")
+      .value("waiting", Activity::waiting, "Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`, or paused for `Controller.resume`.")
       .value("arrived", Activity::arrived, "The goal is reached.")
       .value("blocked", Activity::blocked, "No path leads to the goal, for at least 0.2 s, see Controller.explain; the arm goes as near as it can.")
       .value("stale", Activity::stale, "As SafetyStatus.stale: the arm stops.");
@@ -345,6 +345,23 @@ void bind_controller(nb::module_& m) {
            "after the arm touched something. The goal stays. Without this call the reference restarts once five measured positions in a row agree with each other but not\n"
            "with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
       .def(
+          "continue_from",
+          [](Controller& self, const ArrayLike& position, const ArrayLike& velocity, const ArrayLike& acceleration) {
+            const int nv = self.num_coordinates();
+            const Controller::ClaimedController use(self);
+            self.continue_from(as_vector(position, "position", nv), as_vector(velocity, "velocity", nv),
+                               as_vector(acceleration, "acceleration", nv));
+          },
+          nb::arg("position"), nb::arg("velocity"), nb::arg("acceleration"),
+          "What the arm's drives say that they go on from (nv,), for outputs of positions: the reference of the next step begins there.\n"
+          "For loops of one's own, before `step`, where a command did not reach the drives. Other outputs ignore it. Raises\n"
+          "RuntimeError while a Loop or `integrate` has the controller: a Loop tells it by itself.")
+      .def("pause", &Controller::pause,
+           "The arm comes to rest within its limits and clearances, and stays there until `resume`; its goal or request is kept. The\n"
+           "activity is `waiting` then. From any thread.")
+      .def("resume", &Controller::resume, "Goes on to the goal after `pause`.")
+      .def_prop_ro("is_paused", &Controller::is_paused, "Whether the arm rests until `resume`.")
+      .def(
           "set_arm",
           [](Controller& self, nb::handle other) {
             const Arm& arm = as_instance<Arm>(other, "arm", an_arm);
@@ -422,7 +439,7 @@ void bind_controller(nb::module_& m) {
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
           "[Nm | N] there. `time`: when q and v were measured, on a monotonic clock of yours [s]; without it (None or nan) the machine's\n"
           "clock counts, and in synchronous runs exactly a period. A time that goes back gives a damped stop. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
-          "while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads\n"
+          "while a Loop or `integrate` has the controller; so does what tells of the last step. Warns where several threads\n"
           "step it in turn.")
       .def(
           "record",
@@ -436,6 +453,24 @@ void bind_controller(nb::module_& m) {
           "Before the first step; `with controller.record(path):` ends it with the block, else it ends with the controller. Steps\n"
           "allocate nothing for it and wait for nobody; where the disk is too slow it ends, and the steps after that are counted. Raises\n"
           "RuntimeError after the first step or where one was recorded already, OSError where the file cannot be written.")
+      .def(
+          "black_box",
+          [](Controller& self, const std::filesystem::path& folder, double seconds, std::uint64_t most_bytes) {
+            with_os_errors(folder, [&] {
+              const nb::gil_scoped_release others;
+              self.black_box(folder, seconds, most_bytes);
+            });
+            return BlackBoxInProgress{&self, folder, {}};
+          },
+          nb::arg("folder"), nb::arg("seconds") = 30.0, nb::kw_only(), nb::arg("most_bytes") = black_box_bytes,
+          nb::keep_alive<0, 1>(),
+          nb::sig("def black_box(self, folder: str | os.PathLike[str], seconds: float = 30.0, *, most_bytes: int = 1073741824) "
+                  "-> BlackBox"),
+          "Keeps the last `seconds` (up to a third more) on disk from now on, in files of a third of that each; older ones are deleted.\n"
+          "The folder is kept near most_bytes: where they are reached, less than `seconds` are there, and the file being written comes\n"
+          "on top. For `load_recording` and `sidestep report`: what begins in the middle of a motion cannot be replayed. From any\n"
+          "thread, at any time, beside a recording. `with controller.black_box(folder):` ends it with the block. Raises RuntimeError\n"
+          "where it is on, ValueError, OSError where nothing can be written.")
       .def_prop_ro("command", of_last_step([](const Controller& self) { return Command(self.command()); }), "Of the last step.")
       .def("explain", of_last_step([](const Controller& self) { return self.explain(); }),
            "One sentence: what the last command does and why, and what to do about it.")

@@ -20,9 +20,13 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_arm(m);
   sidestep::python::bind_recording(m);
   sidestep::python::bind_controller(m);
+  sidestep::python::bind_recorded_run(m);
   sidestep::python::bind_sources(m);
-  sidestep::python::bind_real_time(m);
   sidestep::python::bind_depth_camera(m);
   sidestep::python::bind_perception(m);
+  sidestep::python::bind_loop(m);
+  sidestep::python::bind_link(m);
+  sidestep::python::bind_stream_limiter(m);
+  sidestep::python::bind_simulator(m);
   sidestep::python::bind_thesis(m);
 }

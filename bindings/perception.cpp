@@ -7,27 +7,19 @@
 #include <cstring>
 
 #include "arguments.hpp"
+#include "depth_pixels.hpp"
 #include "module.hpp"
 #include "settings.hpp"
 #include "sidestep/perception/camera_check.hpp"
 #include "sidestep/perception/perception.hpp"
 
 namespace sidestep::python {
-namespace {
 
-template <class Number>
-using DepthPixels = nb::ndarray<Number, nb::c_contig, nb::device::cpu>;
-
-/// An array of pixels that keeps what it shows alive.
-struct Pixels {
-  nb::object owner;
-  RawDepth raw;
-};
-
-Pixels as_depth(nb::handle given, const DepthCamera& camera, nb::handle unit) {
+DepthPixels as_depth_pixels(nb::handle given, nb::handle unit) {
   const nb::object array = nb::module_::import_("numpy").attr("ascontiguousarray")(given);
   const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("name"));
-  Pixels pixels{array, {}};
+  DepthPixels pixels;
+  pixels.owner = array;
   const bool whole = kind == "uint16";
   pixels.raw.unit = unit.is_none() ? (whole ? 0.001 : 1.0) : nb::cast<double>(unit);
   if (!(pixels.raw.unit > 0.0 && pixels.raw.unit <= 1.0)) {
@@ -40,18 +32,31 @@ Pixels as_depth(nb::handle given, const DepthCamera& camera, nb::handle unit) {
     pixels.owner = array.attr("astype")("float32");
   }
   const auto take = [&](const auto& image) {
-    if (image.ndim() != 2 || image.shape(0) != static_cast<std::size_t>(camera.height) ||
-        image.shape(1) != static_cast<std::size_t>(camera.width)) {
-      throw nb::value_error(("depth has shape " + std::string(nb::repr(pixels.owner.attr("shape")).c_str()) + ", allowed: (" +
-                             std::to_string(camera.height) + ", " + std::to_string(camera.width) + ") for camera '" + camera.name + "'")
+    if (image.ndim() != 2) {
+      throw nb::value_error(("depth has shape " + std::string(nb::repr(pixels.owner.attr("shape")).c_str()) +
+                             ", allowed: (height, width)")
                                 .c_str());
     }
+    pixels.height = static_cast<int>(image.shape(0));
+    pixels.width = static_cast<int>(image.shape(1));
     pixels.raw.pixels = std::span(image.data(), image.size());
   };
   if (whole) {
-    take(nb::cast<DepthPixels<const std::uint16_t>>(pixels.owner));
+    take(nb::cast<nb::ndarray<const std::uint16_t, nb::c_contig, nb::device::cpu>>(pixels.owner));
   } else {
-    take(nb::cast<DepthPixels<const float>>(pixels.owner));
+    take(nb::cast<nb::ndarray<const float, nb::c_contig, nb::device::cpu>>(pixels.owner));
+  }
+  return pixels;
+}
+
+namespace {
+
+DepthPixels as_depth(nb::handle given, const DepthCamera& camera, nb::handle unit) {
+  DepthPixels pixels = as_depth_pixels(given, unit);
+  if (pixels.height != camera.height || pixels.width != camera.width) {
+    throw nb::value_error(("depth has shape " + std::string(nb::repr(pixels.owner.attr("shape")).c_str()) + ", allowed: (" +
+                           std::to_string(camera.height) + ", " + std::to_string(camera.width) + ") for camera '" + camera.name + "'")
+                              .c_str());
   }
   return pixels;
 }
@@ -87,7 +92,7 @@ template <class Number>
 nb::object image_array(const std::vector<Number>& data, const DepthCamera& camera) {
   const nb::object array = nb::module_::import_("numpy").attr("empty")(nb::make_tuple(camera.height, camera.width), std::is_same_v<Number, float> ? "float32" : "uint8");
   using Raw = std::conditional_t<std::is_same_v<Number, float>, float, std::uint8_t>;
-  const auto view = nb::cast<DepthPixels<Raw>>(array);
+  const auto view = nb::cast<nb::ndarray<Raw, nb::c_contig, nb::device::cpu>>(array);
   std::memcpy(view.data(), data.data(), data.size() * sizeof(Number));
   return array;
 }
@@ -159,7 +164,7 @@ void bind_check(nb::module_& m) {
            "The arm was at q (nv,) at a time [s], later than the last one.")
       .def("add",
            [](CameraCheck& self, nb::handle depth, nb::handle time, nb::handle unit) {
-             const Pixels pixels = as_depth(depth, self.camera(), unit);
+             const DepthPixels pixels = as_depth(depth, self.camera(), unit);
              self.add(pixels.raw, as_capture_time(time));
            },
            nb::arg("depth"), nb::kw_only(), nb::arg("time"), nb::arg("unit") = nb::none(),
@@ -228,7 +233,7 @@ void bind_perception(nb::module_& m) {
       .def(
           "update",
           [](Perception& self, const std::string& camera, nb::handle depth, nb::handle time, nb::handle unit, nb::handle q, nb::handle pose) {
-            const Pixels pixels = as_depth(depth, camera_of(self, camera), unit);
+            const DepthPixels pixels = as_depth(depth, camera_of(self, camera), unit);
             const Capture capture = as_capture(time, q, pose);
             const nb::gil_scoped_release release;
             return self.update(camera, pixels.raw, capture);

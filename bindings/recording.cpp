@@ -25,7 +25,49 @@ RecordingSummary RecordingInProgress::stop() {
   return *summary;
 }
 
+BlackBoxSummary BlackBoxInProgress::stop() {
+  if (!summary) {
+    with_os_errors(folder, [&] {
+      const nb::gil_scoped_release others;
+      summary = controller->stop_black_box();
+    });
+    if (!summary->trouble.empty()) {
+      warn("black box in '" + folder.string() + "': " + summary->trouble + ", so that " + std::to_string(summary->lost) +
+           " steps after step " + std::to_string(summary->steps) + " are lost");
+    }
+  }
+  return *summary;
+}
+
+namespace {
+
+void bind_black_box(nb::module_& m) {
+  nb::class_<BlackBoxSummary>(m, "BlackBoxSummary", "What a black box has kept.")
+      .def_ro("files", &BlackBoxSummary::files, "In the order of time; `load_recording(files)` reads them. Older ones are deleted.")
+      .def_ro("steps", &BlackBoxSummary::steps, "Steps that it recorded, those in deleted files included.")
+      .def_ro("lost", &BlackBoxSummary::lost, "Steps made after those, when the disk was too slow or full.")
+      .def_ro("bytes", &BlackBoxSummary::bytes, "Size of the files.")
+      .def_ro("trouble", &BlackBoxSummary::trouble, "Why nothing was written any more; empty: nothing.")
+      .def("__repr__", [](const BlackBoxSummary& s) {
+        return "BlackBoxSummary(" + std::to_string(s.files.size()) + " files, " + std::to_string(s.bytes) + " bytes, " +
+               std::to_string(s.lost) + " steps lost)";
+      });
+  nb::class_<BlackBoxInProgress>(m, "BlackBox", "The last seconds of a controller on disk; as a context manager it ends with the block.")
+      .def("stop", &BlackBoxInProgress::stop, "Ends it; the files stay. Returns its BlackBoxSummary; warns of lost steps.")
+      .def("__enter__", [](nb::object self) { return self; }, nb::sig("def __enter__(self) -> BlackBox"))
+      .def(
+          "__exit__", [](BlackBoxInProgress& self, nb::handle, nb::handle, nb::handle) { static_cast<void>(self.stop()); },
+          nb::arg("type").none(), nb::arg("value").none(), nb::arg("traceback").none(),
+          nb::sig("def __exit__(self, type: typing.Any, value: typing.Any, traceback: typing.Any) -> None"))
+      .def("__repr__", [](const BlackBoxInProgress& self) { return "BlackBox('" + self.folder.string() + "')"; });
+}
+
+}  // namespace
+
 void bind_recording(nb::module_& m) {
+  bind_black_box(m);
+  m.attr("recording_suffix") = nb::str(recording_suffix.data(), recording_suffix.size());
+  m.attr("black_box_begin") = nb::str(black_box_begin.data(), black_box_begin.size());
   nb::class_<RecordingSummary>(m, "RecordingSummary", "What a recording holds.")
       .def_ro("path", &RecordingSummary::path, "Its file.")
       .def_ro("steps", &RecordingSummary::steps, "Steps that it holds.")
@@ -50,6 +92,7 @@ void bind_recording(nb::module_& m) {
       .def_ro("sidestep_version", &RecordingHeader::sidestep_version, "The version of Sidestep that wrote it.")
       .def_ro("compiler", &RecordingHeader::compiler, "The compiler of that Sidestep.")
       .def_ro("instruction_set", &RecordingHeader::instruction_set, "Of the inner loops, see `instruction_set`.")
+      .def_ro("whole", &RecordingHeader::whole, "From the first step on, so that it can be replayed; else of a black box.")
       .def_ro("arm", &RecordingHeader::arm, "The arm (of the core) of the first step.")
       .def_prop_ro("settings", [](const RecordingHeader& h) { return ControllerSettings(h.settings); }, "A copy.")
       .def_ro("notes", &RecordingHeader::notes, "What this Sidestep does not know of it, or it not of this Sidestep.")

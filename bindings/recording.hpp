@@ -16,4 +16,13 @@ struct RecordingInProgress {
   RecordingSummary stop();
 };
 
+/// A black box of a controller that outlives it.
+struct BlackBoxInProgress {
+  Controller* controller;
+  std::filesystem::path folder;
+  std::optional<BlackBoxSummary> summary;  // Summary, once it has ended.
+
+  BlackBoxSummary stop();
+};
+
 }  // namespace sidestep::python

@@ -20,6 +20,8 @@ import sidestep
 from sidestep._core import perception_settings_fields
 from sidestep.cli import app
 from sidestep.controller import controller_settings_fields
+from sidestep.link import link_messages, link_version
+from sidestep.loop import loop_settings_fields, supervisor_settings_fields
 
 FOLDER = Path(__file__).parent / "reference"
 # The parts of the package, each importing only those before it.
@@ -33,6 +35,8 @@ PARTS = (
     "control",
     "planning",
     "controller",
+    "loop",
+    "drivers",
     "thesis",
 )
 PARTS += ("simulation", "scenario", "bench", "studio")
@@ -62,10 +66,52 @@ PERCEPTION = """
 [from a depth camera](../how-to/camera.md).
 
 """
+LOOP = """
+
+## Loop
+
+`ss.run(controller, driver, settings=ss.loop.LoopSettings(priority=80))`: [run on a robot](../how-to/run-on-a-robot.md).
+
+"""
+SUPERVISOR = """
+
+## Supervisor
+
+`ss.loop.Supervisor(controller, ss.loop.SupervisorSettings(tolerance=0.05))`.
+
+"""
 COMMANDS = """# Command line
 
 Every command has `--help`. Exit codes: 0 on success, 1 when a run fails, 2 on bad input, with one line on stderr.
 `--json -` prints figures to stdout and everything else to stderr. `python docs/make_reference.py` writes this page.
+"""
+
+
+PROTOCOL = f"""# Messages between programs
+
+What `sidestep serve`, its clients, and robots in programs of their own say to each other over a stream
+socket, protocol version {link_version}. [Serve](../how-to/serve.md) says how to use them. `python
+docs/make_reference.py` writes this page from the code.
+
+A message is a header of 20 bytes and the fields of its type, one after the other, all little-endian and
+without padding:
+
+| part | kind | what it is |
+|---|---|---|
+| `magic` | uint32 | 0x54534453, the bytes `SDST` |
+| `version` | uint16 | {link_version}; both sides must have the same |
+| `type` | uint16 | number of the message, see below |
+| `payload` | uint32 | number of bytes that follow the header |
+| `sequence` | uint64 | counts the messages of a sender; an answer has that of its request |
+
+A text is a uint32, the number of bytes, and UTF-8. A vector is a uint32, the number of entries, and float64
+each; a matrix has two uint32, rows and columns, and its entries column by column. A list is a uint32 and its
+entries. A bool is one byte.
+
+Another beginning, another version and a payload longer than the type allows break the protocol: the answer is
+`Refused` with words, and the connection ends. Anything else that is wrong, such as a type that is unknown, a
+number that is none, or what the controller does not allow, is answered by `Refused`, and the connection goes
+on.
 """
 
 
@@ -148,6 +194,21 @@ def command_parts(name: str, command: Any) -> list[str]:
     return parts
 
 
+def protocol_parts() -> list[str]:
+    """The messages of the protocol, each with a table of its fields."""
+    parts = []
+    for message in link_messages():
+        head = f"\n## {message['type']} `{message['name']}`\n\n{message['meaning']}"
+        parts.append(f"{head} From {message['sender']}; at most {message['largest']} bytes.")
+        rows = [
+            f"| `{name}` | {kind} | {meaning.replace('|', chr(92) + '|')} |"
+            for name, kind, meaning in message["fields"]
+        ]
+        if rows:
+            parts += ["", "| field | kind | what it is |", "|---|---|---|", *rows]
+    return parts
+
+
 def pages() -> dict[Path, str]:
     """The text of each page."""
     names = [part for module, names in public_names().items() for part in table(module, names)]
@@ -157,7 +218,12 @@ def pages() -> dict[Path, str]:
         + "\n".join(settings_table(controller_settings_fields()))
         + PERCEPTION
         + "\n".join(settings_table(perception_settings_fields()))
+        + LOOP
+        + "\n".join(settings_table(loop_settings_fields()))
+        + SUPERVISOR
+        + "\n".join(settings_table(supervisor_settings_fields()))
         + "\n",
+        FOLDER / "protocol.md": "\n".join([PROTOCOL.rstrip(), *protocol_parts()]) + "\n",
         FOLDER / "command-line.md": "\n".join(
             [COMMANDS, *command_parts("sidestep", typer.main.get_command(app))]
         )

@@ -26,4 +26,4 @@ while (command := controller.step(*model.state(data), time=data.time)).activity 
     data.ctrl[model.actuators] = command.torque
     mujoco.mj_step(model.model, data)
     touched += data.ncon
-print(f"{controller.explain()} after {data.time:.1f} s, contacts: {touched}")
+print(f"{command.activity.name} after {data.time:.1f} s, contacts: {touched}")

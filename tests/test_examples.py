@@ -155,3 +155,10 @@ def test_12_without_the_camera_the_arm_hits_the_box() -> None:
             blind.replace("touched += data.ncon", "touched += data.ncon\n    if touched:\n        break"), {}
         )
     assert number_after("contacts:", output.getvalue()) > 0
+
+
+def test_13_a_driver_of_ones_own_arrives() -> None:
+    assert run("13") == "arrived the arm is at its goal\n"
+    text = (EXAMPLES / "13_a_driver_of_your_own.py").read_text(encoding="utf-8")
+    driver = text.split("class JsonRobot")[1].split("def stand_in")[0]
+    assert len(driver.splitlines()) <= 60

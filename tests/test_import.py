@@ -165,7 +165,8 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         "jsonschema_rs": "jsonschema-rs",
         "pinocchio": "pin",
     }
-    distribution |= {"sklearn": "scikit-learn", "yaml": "pyyaml"}
+    distribution |= {"sklearn": "scikit-learn", "yaml": "pyyaml", "zenoh": "eclipse-zenoh"}
+    distribution |= dict.fromkeys(("dashboard_client", "rtde_control", "rtde_receive"), "ur-rtde")
     inside = {"websockets"}  # of viser's own requirements
 
     def requirements(extra: str) -> set[str]:
@@ -230,6 +231,8 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         ),
         ("PIL", "from sidestep.perception import read_depth_png; read_depth_png(b'')", "camera"),
         ("pyrealsense2", "from sidestep.perception import RealSense; RealSense('front')", "realsense"),
+        ("dashboard_client", "from sidestep.drivers import UR; UR('127.0.0.1')", "ur"),
+        ("pylibfranka", "from sidestep.drivers import Franka; Franka('robot')", "franka"),
         ("playwright", "from sidestep.studio import headless; headless.check_browser()", "headless"),
         (
             "av",
@@ -283,7 +286,7 @@ for name in sidestep.__all__:
         "Controller",
         "Obstacles",
     } <= at_hand
-    assert {"PoseGoal", "Robot", "RealTimeRun", "robots"} <= at_hand
+    assert {"PoseGoal", "Robot", "run", "robots"} <= at_hand
 
 
 @pytest.mark.parametrize(
@@ -294,6 +297,27 @@ def test_the_command_line_works_with_what_is_always_installed(arguments: tuple[s
     done = run(code, ",".join(OPTIONAL), *arguments)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout != ""
+
+
+def test_replays_and_served_arms_need_only_what_is_always_installed(tmp_path: Path) -> None:
+    code = """
+hide(*sys.argv[1].split(','))
+import sidestep as ss
+from sidestep.cli import main
+arm = ss.Arm.load("planar3")
+controller = ss.Controller(arm, ss.ControllerSettings(output="position", synchronous=True))
+controller.set_obstacles(ss.Obstacles.none())
+controller.set_goal(arm.neutral + 0.01)
+ss.run(controller, ss.drivers.Ideal(arm, real_time=False), record="run.mcap")
+sys.argv[1:] = sys.argv[2:]
+main()
+"""
+    replayed = run(code, ",".join(OPTIONAL), "replay", "run.mcap", folder=tmp_path)
+    assert (replayed.returncode, replayed.stderr) == (0, "")
+    assert "equal" in replayed.stdout
+    served = run(code, ",".join(OPTIONAL), "serve", "planar3", "--driver", "tea", folder=tmp_path)
+    assert served.returncode == 2
+    assert "driver is 'tea'; there are franka, ideal, mujoco" in served.stderr
 
 
 @pytest.mark.parametrize(

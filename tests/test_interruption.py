@@ -38,6 +38,7 @@ import sidestep as ss
 from support import planar_problems
 from sidestep._core import refine_cover
 from sidestep import thesis
+from sidestep.loop import Loop
 from sidestep.planning import OnlinePlanner, PathPlanner, PlannerSettings
 from sidestep.system import GeometricSystem
 
@@ -51,7 +52,10 @@ settings = PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
 planner = PathPlanner(robot, body, settings=settings)
 guide = OnlinePlanner(robot, body, planner=settings, synchronous=True)
 arm = ss.Arm.from_robot(robot)
-run = ss.RealTimeRun(ss.Controller(arm), q, 0 * q, steps=100_000)
+moving = ss.Controller(arm)
+moving.set_obstacles(none)
+run = Loop(moving, ss.drivers.Ideal(arm, q))
+run.start()
 stepped, *many = (ss.Controller(arm, ss.ControllerSettings(synchronous=True)) for _ in range(5))
 
 

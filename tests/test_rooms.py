@@ -16,6 +16,7 @@ ORDER = (
     *("extras", "plugins", "storage", "math"),
     *("shapes", "robot", "shipped_arms", "obstacles", "drawing", "body", "distance", "arm"),
     *("control", "controller", "perception", "planning", "system"),
+    *("loop", "drivers", "link"),
     *("simulation", "scenario", "report", "bench", "studio", "cli", "__main__"),
     "thesis",
 )

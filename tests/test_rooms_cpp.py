@@ -8,7 +8,7 @@ import pytest
 CPP = Path(__file__).parents[1] / "cpp"
 ROOTS = {"src": CPP / "src", "include": CPP / "include"}
 ROOMS = (
-    "math robot scene body clearance arm attractor constraints guard planning controller perception thesis"
+    "math robot scene body clearance arm attractor constraints guard planning controller perception loop link thesis"
 ).split()
 
 

@@ -1,8 +1,8 @@
 """Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-demo, studio; in figures.py and source_figures.py those of the concepts, in camera_figures.py those of a depth camera,
-in theory_figures.py those of the theory; in table.py that of the first screen. That of the studio needs Chromium and
-`pip install 'sidestep[headless]'`.
+demo, studio, report; in figures.py and source_figures.py those of the concepts, in camera_figures.py those of a depth
+camera, in theory_figures.py those of the theory; in table.py that of the first screen. That of the studio needs
+Chromium and `pip install 'sidestep[headless]'`.
 """
 
 import argparse
@@ -35,12 +35,22 @@ def studio(folder: Path) -> None:
     keep(screen, HERE / "studio.png")
 
 
+def report(folder: Path) -> None:
+    """The report of a recorded run: clearance, limits, what happened."""
+    environment = {**os.environ, "SIDESTEP_RECORD": str(folder / "recordings")}
+    words = ["run", "thesis-6.2.3", "--method", "controller", "--out", folder / "run"]
+    subprocess.run([*SIDESTEP, *words], check=True, env=environment)
+    [recording] = (folder / "recordings").glob("*.mcap")
+    subprocess.run([*SIDESTEP, "report", recording, "-o", folder / "report.png"], check=True)
+    keep(folder / "report.png", HERE / "report.png")
+
+
 def keep(source: Path, target: Path) -> None:
     """Copies a picture with 256 colours, spread so that small things keep theirs: under 300 KB."""
     Image.open(source).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE).save(target, optimize=True)
 
 
-MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
+MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio, "report": report}
 FIGURES = {
     "figures": ("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),
     "source_figures": ("believes",),

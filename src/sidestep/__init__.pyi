@@ -1,3 +1,5 @@
+from . import drivers as drivers
+from . import loop as loop
 from . import perception as perception
 from ._core import Activity as Activity
 from ._core import Command as Command
@@ -6,7 +8,6 @@ from ._core import ControllerSettings as ControllerSettings
 from ._core import JointGoal as JointGoal
 from ._core import Obstacles as Obstacles
 from ._core import PoseGoal as PoseGoal
-from ._core import RealTimeRun as RealTimeRun
 from ._core import SafetyStatus as SafetyStatus
 from ._core import __version__ as __version__
 from ._core import integrate as integrate
@@ -16,6 +17,9 @@ from .arm import Arm as Arm
 from .body import Body as Body
 from .distance import ExactClearance as ExactClearance
 from .distance import SceneObject as SceneObject
+from .link import connect as connect
+from .loop import arrived as arrived
+from .loop import run as run
 from .obstacles import Box as Box
 from .obstacles import Capsule as Capsule
 from .obstacles import Cylinder as Cylinder
@@ -23,6 +27,7 @@ from .obstacles import MeshShape as MeshShape
 from .obstacles import Plane as Plane
 from .obstacles import Sphere as Sphere
 from .obstacles import load_point_cloud as load_point_cloud
+from .report import load_recording as load_recording
 from .robot import Robot as Robot
 from .robot import robots as robots
 from .scenario import Scenario as Scenario

@@ -2,15 +2,16 @@
 C++ core of sidestep. Use the names re-exported by the sidestep package.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import enum
 import os
 import pathlib
-from typing import Any, Final, overload
+from typing import Any, Final, Self, overload
 
 import numpy
 import numpy.typing
 
+import sidestep.loop
 import sidestep.obstacles
 
 
@@ -2084,6 +2085,53 @@ class Attachment:
 
     def __repr__(self) -> str: ...
 
+class BlackBoxSummary:
+    """What a black box has kept."""
+
+    @property
+    def files(self) -> list[pathlib.Path]:
+        """
+        In the order of time; `load_recording(files)` reads them. Older ones are deleted.
+        """
+
+    @property
+    def steps(self) -> int:
+        """Steps that it recorded, those in deleted files included."""
+
+    @property
+    def lost(self) -> int:
+        """Steps made after those, when the disk was too slow or full."""
+
+    @property
+    def bytes(self) -> int:
+        """Size of the files."""
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing was written any more; empty: nothing."""
+
+    def __repr__(self) -> str: ...
+
+class BlackBox:
+    """
+    The last seconds of a controller on disk; as a context manager it ends with the block.
+    """
+
+    def stop(self) -> BlackBoxSummary:
+        """
+        Ends it; the files stay. Returns its BlackBoxSummary; warns of lost steps.
+        """
+
+    def __enter__(self) -> BlackBox: ...
+
+    def __exit__(self, type: Any, value: Any, traceback: Any) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+recording_suffix: str = '.mcap'
+
+black_box_begin: str = 'blackbox-'
+
 class RecordingSummary:
     """What a recording holds."""
 
@@ -2139,6 +2187,12 @@ class RecordingHeader:
     @property
     def instruction_set(self) -> str:
         """Of the inner loops, see `instruction_set`."""
+
+    @property
+    def whole(self) -> bool:
+        """
+        From the first step on, so that it can be replayed; else of a black box.
+        """
 
     @property
     def arm(self) -> Arm:
@@ -3202,7 +3256,7 @@ class Activity(enum.Enum):
 
     waiting = 2
     """
-    Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`.
+    Waiting until a posture is found, its trajectory is free, or after a touch for `Controller.restart`, or paused for `Controller.resume`.
     """
 
     arrived = 3
@@ -3441,6 +3495,26 @@ class Controller:
         with the command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.
         """
 
+    def continue_from(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike) -> None:
+        """
+        What the arm's drives say that they go on from (nv,), for outputs of positions: the reference of the next step begins there.
+        For loops of one's own, before `step`, where a command did not reach the drives. Other outputs ignore it. Raises
+        RuntimeError while a Loop or `integrate` has the controller: a Loop tells it by itself.
+        """
+
+    def pause(self) -> None:
+        """
+        The arm comes to rest within its limits and clearances, and stays there until `resume`; its goal or request is kept. The
+        activity is `waiting` then. From any thread.
+        """
+
+    def resume(self) -> None:
+        """Goes on to the goal after `pause`."""
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the arm rests until `resume`."""
+
     def set_arm(self, arm: Arm) -> None:
         """
         Replaces body, inertias and pairs, for example by a finer cover; joints and limits must be the same. Takes some tenths of
@@ -3482,7 +3556,7 @@ class Controller:
         One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
         [Nm | N] there. `time`: when q and v were measured, on a monotonic clock of yours [s]; without it (None or nan) the machine's
         clock counts, and in synchronous runs exactly a period. A time that goes back gives a damped stop. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
-        while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads
+        while a Loop or `integrate` has the controller; so does what tells of the last step. Warns where several threads
         step it in turn.
         """
 
@@ -3492,6 +3566,15 @@ class Controller:
         Before the first step; `with controller.record(path):` ends it with the block, else it ends with the controller. Steps
         allocate nothing for it and wait for nobody; where the disk is too slow it ends, and the steps after that are counted. Raises
         RuntimeError after the first step or where one was recorded already, OSError where the file cannot be written.
+        """
+
+    def black_box(self, folder: str | os.PathLike[str], seconds: float = 30.0, *, most_bytes: int = 1073741824) -> BlackBox:
+        """
+        Keeps the last `seconds` (up to a third more) on disk from now on, in files of a third of that each; older ones are deleted.
+        The folder is kept near most_bytes: where they are reached, less than `seconds` are there, and the file being written comes
+        on top. For `load_recording` and `sidestep report`: what begins in the middle of a motion cannot be replayed. From any
+        thread, at any time, beside a recording. `with controller.black_box(folder):` ends it with the block. Raises RuntimeError
+        where it is on, ValueError, OSError where nothing can be written.
         """
 
     @property
@@ -3683,6 +3766,154 @@ def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing
     ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
 
+class RecordedRun:
+    """A recorded run as arrays; row k is step k."""
+
+    @property
+    def header(self) -> RecordingHeader:
+        """What made the recording, and with what."""
+
+    @property
+    def complete(self) -> bool:
+        """The recording was ended, not cut off by the end of its program."""
+
+    @property
+    def lost(self) -> int:
+        """Steps that were made and not recorded."""
+
+    @property
+    def damage(self) -> str:
+        """What is wrong with a file, and where; empty: nothing."""
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) on the clock of `step` [s]."""
+
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) measured [rad | m]."""
+
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) measured [rad/s | m/s]."""
+
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) commanded [rad | m]."""
+
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) commanded [rad/s | m/s]."""
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) commanded [rad/s² | m/s²]."""
+
+    @property
+    def wanted(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) acceleration before any limit [rad/s² | m/s²]."""
+
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) commanded, gravity included [Nm | N]."""
+
+    @property
+    def torque_without_gravity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv) commanded [Nm | N]."""
+
+    @property
+    def clearance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) least of the covering body [m]; inf: far, nan: unknown."""
+
+    @property
+    def distance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) to the nearest obstacle, with speed limits [m]."""
+
+    @property
+    def speed(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) of the fastest frame [m/s]."""
+
+    @property
+    def speed_limit(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) for every frame [m/s]."""
+
+    @property
+    def tracking_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) largest of the joints [rad | m]."""
+
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(steps,) numbers of SafetyStatus."""
+
+    @property
+    def activity(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(steps,) numbers of Activity."""
+
+    @property
+    def nearest(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (steps,) index in `parties` of the least clearance; -1: nothing is near.
+        """
+
+    @property
+    def bound_by(self) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (steps,) index in `parties` of what changes the motion most; -1: nothing.
+        """
+
+    @property
+    def request(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(steps,) index in `requests`; -1: none is known."""
+
+    @property
+    def link_time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(moments,) of `link_clearance` [s]."""
+
+    @property
+    def limits(self) -> numpy.typing.NDArray[numpy.uint16]:
+        """(steps, nv) limits that restrict each joint, as bits."""
+
+    @property
+    def link_clearance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (moments, links) of each link to what is around [m], and of the arm to itself (the last); inf: farther than 0.5 m.
+        Computed by the clearance query from the recorded q and obstacles.
+        """
+
+    def scene(self, moment: int) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
+        """
+        Centres (N, 3) [m] and radii (N,) [m] of the obstacles at a moment of link_time, if they were read.
+        """
+
+    @property
+    def links(self) -> list[str]:
+        """Names of the links, and "the arm itself"."""
+
+    @property
+    def requests(self) -> list[str]:
+        """What was asked, in words, in the order of use."""
+
+    @property
+    def parties(self) -> list[tuple[str, str]]:
+        """A link, and what it is near to in words."""
+
+    def explain(self, step: int) -> str:
+        """
+        One sentence from what was recorded: how safe a step (from 0) was, and why.
+        """
+
+    def __repr__(self) -> str: ...
+
+def read_recorded_run(paths: Sequence[str | os.PathLike[str]], *, scenes: bool = False) -> RecordedRun:
+    """
+    Reads a recording, or the files of one black box in the order of time; with `scenes` also where the obstacles were. Raises
+    OSError where one cannot be read, ValueError that says what is wrong with it.
+    """
+
 class SourceState:
     """What a controller believes of a source of obstacles."""
 
@@ -3709,57 +3940,6 @@ class SourceState:
     @property
     def is_emptied(self) -> bool:
         """Newer sets are empty, and not believed yet."""
-
-    def __repr__(self) -> str: ...
-
-class RealTimeRun:
-    """
-    Runs a Controller at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1
-    periods after the start, and late steps are not skipped. The arm is an ideal robot: v += a T, q += v T. Until the run
-    ends the controller is reserved for it: others may only set goals and obstacles, and read what the planner knows. steps: at most 100,000,000,
-    of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault,
-    RuntimeError if the controller is in use.
-    """
-
-    def __init__(self, controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int = 10000, priority: bool = True) -> None: ...
-
-    @property
-    def running(self) -> bool:
-        """Whether steps are left."""
-
-    def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """q, v (nv,) before the next step; for one thread."""
-
-    def finish(self) -> RealTimeRecord:
-        """
-        Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.
-        """
-
-    def stop(self) -> None:
-        """
-        Asks for the end after the step at hand, and waits for nothing: `finish` does.
-        """
-
-    def __repr__(self) -> str: ...
-
-class RealTimeRecord:
-    """When the steps of a real-time run began and ended."""
-
-    @property
-    def late(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(T,) [s] from when a step was due to when it began."""
-
-    @property
-    def taken(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(T,) [s] from when it began to when its command was there."""
-
-    @property
-    def missed(self) -> int:
-        """Steps that ended after the next one was due."""
-
-    @property
-    def prioritised(self) -> bool:
-        """Whether real-time scheduling was granted."""
 
     def __repr__(self) -> str: ...
 
@@ -4116,13 +4296,14 @@ class PerceptionSettings:
         memory [s], default 30.0, allowed 0 to inf: time for which something is kept that is hidden or out of view now; what moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen: longer keeps more that is gone
         clear_after, default 2, allowed 1 to 10: number of images in a row that must see through a cell before what was there is gone: more is safer against flicker, and clears later
         least_pixels, default 3, allowed 1 to 100: number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it: more makes fewer ghosts, and shows thin things later
+        steady_images, default 8, allowed 1 to 100: number of images over which a camera that stands still averages the depth of what rests (1: none): more is smoother, and up to 2 sigma behind what moves slowly (by less than 1 sigma from image to image)
         unseen_is_free, default True, allowed 0 to 1: space that no camera has seen yet counts as free; without it the arm keeps clear of what nobody has looked at, and reaches less
         valid_for [s], default 0.25, allowed 0.001 to inf: age up to which the image of a camera is believed; then the arm stops until the next one comes: longer bridges more lost images
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, voxel: float = 0.02, reach_margin: float = 0.25, view_margin: float = 2.0, memory: float = 30.0, clear_after: int = 2, least_pixels: int = 3, unseen_is_free: bool = True, valid_for: float = 0.25) -> None: ...
+    def __init__(self, *, voxel: float = 0.02, reach_margin: float = 0.25, view_margin: float = 2.0, memory: float = 30.0, clear_after: int = 2, least_pixels: int = 3, steady_images: int = 8, unseen_is_free: bool = True, valid_for: float = 0.25) -> None: ...
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
@@ -4177,6 +4358,12 @@ class PerceptionSettings:
 
     @least_pixels.setter
     def least_pixels(self, value: int, /) -> None: ...
+
+    @property
+    def steady_images(self) -> int: ...
+
+    @steady_images.setter
+    def steady_images(self, value: int, /) -> None: ...
 
     @property
     def unseen_is_free(self) -> bool: ...
@@ -4270,6 +4457,960 @@ class Perception:
     def unseen(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Middles (N, 3) of cells where nobody has looked and that border on seen space [m].
+        """
+
+class RobotState:
+    """What a robot says of itself in one cycle."""
+
+    def __init__(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, time: float | None = None, torque: numpy.typing.ArrayLike | None = None, told_position: numpy.typing.ArrayLike | None = None, told_velocity: numpy.typing.ArrayLike | None = None, told_acceleration: numpy.typing.ArrayLike | None = None, lost_cycles: int = 0, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        q, v (nv,) measured [rad | m], [/s]. mass_matrix (nv, nv) and bias (nv,) [Nm | N], both or neither: the robot's own dynamics
+        there, for which the torques are computed then. Raises ValueError on wrong shapes.
+        """
+
+    @property
+    def time(self) -> float:
+        """
+        When it was measured [s]: on the machine's monotonic clock (`time.monotonic()`), or on the model's clock of a
+        simulation; nan: the robot does not say.
+        """
+
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) measured [rad | m]."""
+
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) measured [rad/s | m/s]."""
+
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) measured, gravity included [Nm | N]; nan: the robot does not say.
+        """
+
+    @property
+    def told_position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) what the robot goes on from, if it interpolates what it is sent [rad | m]; nan: it does not say.
+        """
+
+    @property
+    def told_velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) the same [rad/s | m/s]."""
+
+    @property
+    def told_acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) the same [rad/s^2 | m/s^2]."""
+
+    @property
+    def lost_cycles(self) -> int:
+        """
+        Cycles since the state before in which the robot went on without a command.
+        """
+
+    def __repr__(self) -> str: ...
+
+class RobotDescription:
+    """What a driver says of its robot, once."""
+
+    def __init__(self, name: str, *, period: float, outputs: Sequence[str], joints: Sequence[str] = [], limits: JointLimits | None = None, paced: bool = True, real_time: bool = True, when_silent: str = 'not told') -> None:
+        """
+        period: of its cycle [s]; outputs: what it takes, of "torque", "acceleration", "velocity", "position"; joints: names in
+        the order of its state, compared with the arm's; limits: of the robot, which the arm's must not exceed; paced: `read` waits
+        for the robot's cycle, else the loop's own clock is the pace; real_time: False for a model on its own clock; when_silent:
+        what it does when nobody writes, in words. Raises ValueError that names what is wrong.
+        """
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def joints(self) -> list[str]:
+        """
+        Names of its joints, in the order of its state; empty: it does not say.
+        """
+
+    @property
+    def period(self) -> float:
+        """Of its cycle [s]."""
+
+    @property
+    def outputs(self) -> list[str]:
+        """What it takes."""
+
+    @property
+    def paced(self) -> bool:
+        """Whether `read` waits for its cycle."""
+
+    @property
+    def real_time(self) -> bool:
+        """False: a model on its own clock."""
+
+    @property
+    def when_silent(self) -> str:
+        """What it does when nobody writes, in words."""
+
+    def __repr__(self) -> str: ...
+
+class RunEnd(enum.Enum):
+    """Why a run ended."""
+
+    running = 0
+    """It has not ended."""
+
+    arrived = 1
+    """The arm has been at its goal for `hold`, or `until` said so."""
+
+    duration = 2
+    """Its time was over."""
+
+    stopped = 3
+    """Somebody asked for it."""
+
+    interrupted = 4
+    """Ctrl-C."""
+
+    failed = 5
+    """An exception of the program around it."""
+
+    state_lost = 6
+    """No new state came from the robot, or the connection is gone."""
+
+    robot_stopped = 7
+    """The robot has stopped itself."""
+
+    late = 8
+    """The loop was later than `longest_gap`."""
+
+    source_silent = 9
+    """A source of obstacles was overdue for `silent_timeout`."""
+
+    denied = 10
+    """A supervisor did not approve of a command."""
+
+class RunReport:
+    """What a run on a robot was."""
+
+    @property
+    def end(self) -> RunEnd:
+        """Why it ended."""
+
+    @property
+    def why(self) -> str:
+        """The same in words."""
+
+    @property
+    def at_the_end(self) -> str:
+        """What the controller said last, see `Controller.explain`."""
+
+    @property
+    def cycles(self) -> int:
+        """Commands that were computed."""
+
+    @property
+    def missed(self) -> int:
+        """Cycles that ended after the next one was due."""
+
+    @property
+    def lost(self) -> int:
+        """Cycles in which the robot went on without a command, as it says."""
+
+    @property
+    def unwritten(self) -> int:
+        """Commands that were not written: without a position, or not approved."""
+
+    @property
+    def worst(self) -> SafetyStatus:
+        """Most severe status of a command."""
+
+    @property
+    def stop_time(self) -> float:
+        """Time from the reason to the end until the loop let go of the arm [s]."""
+
+    @property
+    def at_rest(self) -> bool:
+        """The arm was at rest, as measured, when the loop let go of it."""
+
+    @property
+    def scheduling(self) -> str:
+        """What the machine permitted, in words."""
+
+    @property
+    def prioritised(self) -> bool:
+        """Whether real-time scheduling was permitted."""
+
+    @property
+    def late(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (T,) of the last cycles: time from when each was due until it began [s]; 0 where the robot is the pace.
+        """
+
+    @property
+    def taken(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (T,) of the last cycles: time from the state until the command was written [s].
+        """
+
+    @property
+    def is_success(self) -> bool:
+        """Whether nothing ended the run before its time."""
+
+    def __repr__(self) -> str: ...
+
+class RobotStopped(RuntimeError):
+    pass
+
+class LoopSettings:
+    """
+    How a run on a robot goes, and when it ends.
+
+        duration [s], default inf, allowed 0 to inf: longest time of a run, counted in cycles; then the arm is brought to rest
+        until_arrived, default False, allowed 0 to 1: the run ends when the arm has been at its goal for `hold`
+        hold [s], default 0.2, allowed 0 to 60: time for which the arm must be at its goal before the run ends
+        priority, default 60, allowed 0 to 99: priority of the loop's thread among real-time threads (SCHED_FIFO), where the machine permits it; 0: none. Higher is later less often, and lets other threads wait
+        lock_memory, default True, allowed 0 to 1: keeps the program's memory from being swapped out, where the machine permits it
+        start_timeout [s], default 5.0, allowed 0 to 600: longest wait for the robot's first state and the first obstacles
+        state_timeout [s], default 0.1, allowed 0.001 to 10: time without a new state after which it counts as lost: the arm is braked without it, and the run ends. Longer bridges more lost messages, and brakes later
+        longest_gap [s], default 0.1, allowed 0.001 to 10: longest delay of the loop itself, and largest jump of the states' clock; beyond it the run ends. Longer bears a busier machine, and leaves the robot alone for longer
+        silent_timeout [s], default 10.0, allowed 0 to inf: time for which the arm waits at rest for a source of obstacles that has fallen silent; then the run ends
+        stop_timeout [s], default 3.0, allowed 0 to 60: longest time for coming to rest at the end of a run
+        start_in_contact, default False, allowed 0 to 1: begins also where the covering body of the arm overlaps something: the arm leads itself out
+        kept_times, default 60000, allowed 1 to 1e+08: number of the last cycles whose times are kept; 16 bytes each
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, duration: float = ..., until_arrived: bool = False, hold: float = 0.2, priority: int = 60, lock_memory: bool = True, start_timeout: float = 5.0, state_timeout: float = 0.1, longest_gap: float = 0.1, silent_timeout: float = 10.0, stop_timeout: float = 3.0, start_in_contact: bool = False, kept_times: int = 60000) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: LoopSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> LoopSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def duration(self) -> float: ...
+
+    @duration.setter
+    def duration(self, value: float, /) -> None: ...
+
+    @property
+    def until_arrived(self) -> bool: ...
+
+    @until_arrived.setter
+    def until_arrived(self, value: bool, /) -> None: ...
+
+    @property
+    def hold(self) -> float: ...
+
+    @hold.setter
+    def hold(self, value: float, /) -> None: ...
+
+    @property
+    def priority(self) -> int: ...
+
+    @priority.setter
+    def priority(self, value: int, /) -> None: ...
+
+    @property
+    def lock_memory(self) -> bool: ...
+
+    @lock_memory.setter
+    def lock_memory(self, value: bool, /) -> None: ...
+
+    @property
+    def start_timeout(self) -> float: ...
+
+    @start_timeout.setter
+    def start_timeout(self, value: float, /) -> None: ...
+
+    @property
+    def state_timeout(self) -> float: ...
+
+    @state_timeout.setter
+    def state_timeout(self, value: float, /) -> None: ...
+
+    @property
+    def longest_gap(self) -> float: ...
+
+    @longest_gap.setter
+    def longest_gap(self, value: float, /) -> None: ...
+
+    @property
+    def silent_timeout(self) -> float: ...
+
+    @silent_timeout.setter
+    def silent_timeout(self, value: float, /) -> None: ...
+
+    @property
+    def stop_timeout(self) -> float: ...
+
+    @stop_timeout.setter
+    def stop_timeout(self, value: float, /) -> None: ...
+
+    @property
+    def start_in_contact(self) -> bool: ...
+
+    @start_in_contact.setter
+    def start_in_contact(self, value: bool, /) -> None: ...
+
+    @property
+    def kept_times(self) -> int: ...
+
+    @kept_times.setter
+    def kept_times(self, value: int, /) -> None: ...
+
+def clock_lateness(seconds: float, *, period: float = 0.001, priority: int = 60) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    How late a thread wakes (T,) [s] that does nothing but wait for its turn, once a period [s]: what a loop on this machine cannot be
+    better than.
+    """
+
+def supervisor_settings_fields() -> list[dict[str, float | str]]:
+    """Every setting of a Supervisor, as `controller_settings_fields`."""
+
+def loop_settings_fields() -> list[dict[str, float | str]]:
+    """Every setting of a Loop, as `controller_settings_fields`."""
+
+class NativeDriver:
+    """A driver that needs no Python in the loop."""
+
+    @property
+    def description(self) -> RobotDescription:
+        """RobotDescription of its robot."""
+
+    def read(self, num_coordinates: int, timeout: float = 0.1) -> RobotState | None:
+        """
+        The robot's next state, for who only looks: not while a run goes on with this driver. None: there was none within timeout [s].
+        Raises RuntimeError where the connection is gone or the robot has stopped itself.
+        """
+
+    @property
+    def trouble(self) -> str:
+        """Why the last call failed, in words."""
+
+class IdealDriver(NativeDriver):
+    """
+    An ideal robot: it tracks every command exactly. With torque or acceleration v += a T, q += v T; with velocity or position it is
+    where the reference is, at its speed. Its clock is the machine's; real_time=False: its own, as fast as the loop can.
+    """
+
+    def __init__(self, arm: Arm, q: numpy.typing.ArrayLike | None = None, *, v: numpy.typing.ArrayLike | None = None, period: float = 0.001, real_time: bool = True) -> None: ...
+
+    def __enter__(self) -> IdealDriver: ...
+
+    def __exit__(self, type: Any, value: Any, traceback: Any) -> None: ...
+
+class CycleObserver:
+    """Takes part in every cycle of a Loop, in its thread."""
+
+class SupervisorSettings:
+    """
+    How far a supervisor lets things go.
+
+        tolerance, default 0.1, allowed 0 to 10: share by which velocities, torques and torque rates may exceed their limits: more bears more noise, and denies later
+        position_tolerance [rad], default 0.02, allowed 0 to 1: distance by which positions may be outside their limits
+        tracking_tolerance [rad], default 0.3, allowed 0.001 to inf: largest distance of a commanded position from the measured one: a jump is denied
+        state_age [s], default 0.05, allowed 0.001 to inf: age above which a measured state is too old
+        blind_time [s], default 1.5, allowed 0.001 to inf: time without a new state after which no command is approved any more: the loop brakes the arm without one for less
+        command_age [s], default 0.02, allowed 0.001 to inf: time without a report of the loop after which approval ends
+        approval_age [s], default 0.02, allowed 0.001 to inf: age above which the supervisor's last approval does not count: longer bears a busier machine, and notices its death later
+        stale_time [s], default 1.0, allowed 0.01 to inf: time after which an arm must be at rest whose obstacles are too old
+        rest_speed [rad/s], default 0.05, allowed 0.001 to inf: joint speed that counts as rest then
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, tolerance: float = 0.1, position_tolerance: float = 0.02, tracking_tolerance: float = 0.3, state_age: float = 0.05, blind_time: float = 1.5, command_age: float = 0.02, approval_age: float = 0.02, stale_time: float = 1.0, rest_speed: float = 0.05) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: SupervisorSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> SupervisorSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def tolerance(self) -> float: ...
+
+    @tolerance.setter
+    def tolerance(self, value: float, /) -> None: ...
+
+    @property
+    def position_tolerance(self) -> float: ...
+
+    @position_tolerance.setter
+    def position_tolerance(self, value: float, /) -> None: ...
+
+    @property
+    def tracking_tolerance(self) -> float: ...
+
+    @tracking_tolerance.setter
+    def tracking_tolerance(self, value: float, /) -> None: ...
+
+    @property
+    def state_age(self) -> float: ...
+
+    @state_age.setter
+    def state_age(self, value: float, /) -> None: ...
+
+    @property
+    def blind_time(self) -> float: ...
+
+    @blind_time.setter
+    def blind_time(self, value: float, /) -> None: ...
+
+    @property
+    def command_age(self) -> float: ...
+
+    @command_age.setter
+    def command_age(self, value: float, /) -> None: ...
+
+    @property
+    def approval_age(self) -> float: ...
+
+    @approval_age.setter
+    def approval_age(self, value: float, /) -> None: ...
+
+    @property
+    def stale_time(self) -> float: ...
+
+    @stale_time.setter
+    def stale_time(self, value: float, /) -> None: ...
+
+    @property
+    def rest_speed(self) -> float: ...
+
+    @rest_speed.setter
+    def rest_speed(self, value: float, /) -> None: ...
+
+class SupervisorLink(CycleObserver):
+    """
+    The loop's side of a supervisor, see `sidestep.loop.Supervisor`: it reports each cycle in memory that two processes share, and
+    approves only what the other process has approved.
+    """
+
+    def __init__(self, controller: Controller, settings: SupervisorSettings | None = None) -> None: ...
+
+    @property
+    def path(self) -> str:
+        """The file of the shared memory."""
+
+    def wait_for_supervisor(self, timeout: float) -> bool:
+        """
+        Waits so long at most [s] until the other process answers; whether it does.
+        """
+
+    @property
+    def approves(self) -> bool:
+        """Whether its last verdict approves."""
+
+    @property
+    def why(self) -> str:
+        """What it said last to a loop, in words."""
+
+    def reset(self) -> None:
+        """What was denied may be tried again."""
+
+def supervise(path: str) -> None:
+    """
+    The other process of a SupervisorLink: judges what its loop reports until that process is gone, or Ctrl-C.
+    """
+
+class Loop:
+    """
+    Runs a Controller on a robot in a real-time thread of its own: reads the state, steps, writes the command, once a period. See
+    `sidestep.run`, which makes one and waits for its end. Before the first motion it checks that controller and robot fit (joints,
+    limits, period, output: ValueError), that the state is plausible and free, and that obstacles are known (RuntimeError by `start`).
+    However it ends, the arm is brought to rest within its limits and clearances first. RuntimeError if the controller is in use.
+    """
+
+    def __init__(self, controller: Controller, driver: Any, settings: LoopSettings | None = None, *, until_arrived: bool | None = None, duration: float | None = None, observers: Sequence[CycleObserver] = ()) -> None: ...
+
+    def start(self) -> None:
+        """
+        Checks state and world, and begins. Raises RuntimeError that says what is wrong and what to do.
+        """
+
+    def stop(self, end: RunEnd | str = 'stopped', why: str = '') -> None:
+        """
+        Ends the run: brings the arm to rest first. Waits for nothing; the first reason counts.
+        """
+
+    def wait(self, seconds: float) -> bool:
+        """
+        Waits so long at most [s]; whether the run has ended. Ctrl-C raises, the run goes on.
+        """
+
+    def finish(self) -> RunReport:
+        """
+        Waits for the end; the RunReport. Ctrl-C stops the run, and raises once the arm is at rest.
+        """
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the run has not ended."""
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether the arm is being brought to rest."""
+
+    def state(self) -> RobotState:
+        """The newest RobotState; for one thread."""
+
+    def __repr__(self) -> str: ...
+
+class ModelLoop:
+    """
+    The loop of a model that you move yourself, such as a simulation: one cycle of `Loop` per call, in your thread and in the model's
+    time. Nothing is checked before the first motion: a model shows what the controller does in any state. Without settings nothing
+    ends it but `stop`, or a time that jumps by more than 10 s. Between two cycles the controller is free for you.
+    """
+
+    def __init__(self, controller: Controller, settings: LoopSettings | None = None) -> None: ...
+
+    def cycle(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None, *, time: float | None = None) -> Command:
+        """
+        One cycle at a state, see `Controller.step` for what is given; the command, for you to carry out. The first cycle restarts the
+        controller's reference at the state. Raises ValueError on wrong shapes, RuntimeError once the run is over or while the
+        controller is in use.
+        """
+
+    def stop(self, end: RunEnd | str = 'stopped', why: str = '') -> None:
+        """
+        Ends the run: the cycles that follow bring the arm to rest. The first reason counts.
+        """
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the arm is at rest after the end: no cycle follows."""
+
+    def report(self) -> RunReport:
+        """The RunReport: of the run once it is over, before of why it is ending."""
+
+    def __repr__(self) -> str: ...
+
+class ConnectionLost(ConnectionError):
+    """The server does not answer, or the connection has ended."""
+
+class Cycle:
+    """One cycle of a loop, as a client of its server gets it."""
+
+    @property
+    def number(self) -> int:
+        """Counts cycles."""
+
+    @property
+    def time(self) -> float:
+        """Of the server's monotonic clock [s]."""
+
+    @property
+    def state(self) -> RobotState:
+        """State of the arm."""
+
+    @property
+    def command(self) -> Command:
+        """What it was told."""
+
+    @property
+    def in_command(self) -> int:
+        """Number of the client in command; 0: nobody."""
+
+    def __repr__(self) -> str: ...
+
+class Client:
+    """
+    Moves an arm that another program serves: the methods of a Controller over a connection, see `sidestep.connect`. From any thread;
+    each call waits for its answer. Raises ValueError in the server's words where it refuses, ConnectionError where it is gone.
+    """
+
+    def __init__(self, address: str, token: str = '', *, name: str = '', rate: float = 100.0, timeout: float = 2.0) -> None: ...
+
+    @staticmethod
+    def over(descriptor: int, token: str = '', *, name: str = '', rate: float = 100.0, timeout: float = 2.0) -> Client:
+        """
+        A client over a stream socket that is connected, which it closes; for bridges.
+        """
+
+    def take_command(self, *, force: bool = False, keep_goal: bool = False) -> None:
+        """
+        Becomes the client that moves the arm. force: also where another one is, which is told. keep_goal: the goal stays when this
+        client leaves or is lost; else it is cleared, and the arm comes to rest. Raises ValueError where another one is in command.
+        """
+
+    def release_command(self) -> None:
+        """
+        Hands the command back; see `take_command` for what becomes of the goal.
+        """
+
+    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None:
+        """As Controller.set_goal. In command."""
+
+    def set_velocity(self, v: numpy.typing.ArrayLike) -> None:
+        """As Controller.set_velocity. In command."""
+
+    def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False, free: TwistFreedom | str = 'none') -> None:
+        """As Controller.set_twist. In command."""
+
+    def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, behaviour: TrajectoryBehaviour | str = 'keep_path') -> None:
+        """As Controller.set_trajectory. In command."""
+
+    def clear_goal(self) -> None:
+        """As Controller.clear_goal. In command."""
+
+    def restart(self) -> None:
+        """As Controller.restart. In command."""
+
+    def pause(self) -> None:
+        """The arm comes to rest; its goal is kept. With the token."""
+
+    def resume(self) -> None:
+        """The arm goes on, after `pause` or after a run has ended. In command."""
+
+    def stop_run(self, why: str = '') -> None:
+        """The arm comes to rest, and the run ends. With the token."""
+
+    def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape], source: str = 'scene', *, time: float | None = None, valid_for: float | None = None) -> None:
+        """
+        As Controller.set_obstacles. With the token; the client need not be in command.
+        """
+
+    def add_obstacle(self, obstacle: Obstacles | sidestep.obstacles.Shape, source: str = 'scene') -> None:
+        """As Controller.add_obstacle. With the token."""
+
+    def move_obstacle(self, name: str, pose: numpy.typing.ArrayLike, source: str = 'scene', *, time: float | None = None, valid_for: float | None = None) -> None:
+        """As Controller.move_obstacle. With the token."""
+
+    def remove_obstacle(self, name: str, source: str = 'scene') -> None:
+        """As Controller.remove_obstacle. With the token."""
+
+    def remove_obstacles(self, source: str = 'scene') -> None:
+        """As Controller.remove_obstacles. With the token."""
+
+    def update(self, camera: str, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None, pose: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        An image of one of the server's cameras, as Perception.update. With the token. The server works on it after it has answered;
+        what it then finds wrong is among the `notices`.
+        """
+
+    def subscribe(self, rate: float) -> None:
+        """How often cycles come [Hz]; inf: every cycle; 0: none."""
+
+    def cycle(self) -> Cycle:
+        """The newest Cycle. Raises RuntimeError where none has come yet."""
+
+    def next_cycle(self, after: int = 0, timeout: float = 1.0) -> Cycle | None:
+        """
+        The newest Cycle once there is one after that number; None: not within timeout [s].
+        """
+
+    def state(self) -> RobotState:
+        """State of the arm in the newest cycle, a RobotState."""
+
+    def command(self) -> Command:
+        """The Command of the newest cycle."""
+
+    def wait(self, until: sidestep.loop.Arrived | Callable[[RobotState], bool], timeout: float = 60.0) -> bool:
+        """
+        Waits until the arm has arrived, or a function of the state is true, in a cycle that follows this client's last request. False:
+        not within timeout [s]. Raises RuntimeError where the run has ended, or another client has taken the command, ConnectionError
+        where the server is gone.
+        """
+
+    def explain(self) -> str:
+        """One sentence: what the arm does and why, as Controller.explain."""
+
+    def ping(self) -> float:
+        """Time until the server has answered [s]."""
+
+    def notices(self) -> list[str]:
+        """What the server has told all clients since the last call, in words."""
+
+    def close(self) -> None:
+        """Ends the connection."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, type: Any, value: Any, traceback: Any) -> None: ...
+
+    @property
+    def in_command(self) -> bool:
+        """Whether this client is the one that moves the arm."""
+
+    @property
+    def may_command(self) -> bool:
+        """Whether the token was right."""
+
+    @property
+    def arm(self) -> str:
+        """Name of the arm."""
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints, in the order of all vectors (nv)."""
+
+    @property
+    def frames(self) -> list[str]:
+        """Names of the frames that twists may have."""
+
+    @property
+    def cameras(self) -> list[str]:
+        """Names of the cameras whose images are taken."""
+
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) position limits [rad | m]."""
+
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) position limits [rad | m]."""
+
+    @property
+    def period(self) -> float:
+        """Of a step [s]."""
+
+    def __repr__(self) -> str: ...
+
+class ClientInfo:
+    """A client of a Server."""
+
+    @property
+    def number(self) -> int: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def may_command(self) -> bool:
+        """It has shown the token."""
+
+    @property
+    def in_command(self) -> bool:
+        """It is the one that moves the arm."""
+
+    @property
+    def rate(self) -> float:
+        """Of the cycles that it is sent [Hz]."""
+
+    @property
+    def left_out(self) -> int:
+        """Cycles that it was not sent because it reads too slowly."""
+
+    def __repr__(self) -> str: ...
+
+class Server(CycleObserver):
+    """
+    Lets other programs of this machine move the arm of a controller: an observer for `sidestep.run`. It listens at a name ('arm'), a
+    Unix domain socket ('unix:/PATH') or a port of the loopback ('tcp:5555'; 0: one that is free), until it is forgotten. Clients that
+    move the arm show the token in `token_file`, which only this user can read. Raises ValueError on an address that is none, OSError
+    where it is taken.
+    """
+
+    def __init__(self, controller: Controller, address: str = 'arm', *, token_file: str | os.PathLike[str] | None = None, perception: Perception | None = None, most_clients: int = 16) -> None: ...
+
+    @property
+    def address(self) -> str:
+        """Where it listens."""
+
+    @property
+    def token_file(self) -> pathlib.Path: ...
+
+    @property
+    def clients(self) -> list[ClientInfo]: ...
+
+    def run_began(self) -> None:
+        """Tells clients that a run has begun."""
+
+    def run_ended(self, why: str) -> None:
+        """Tells clients that it has ended."""
+
+    def take_stop(self) -> str | None:
+        """
+        Why a client has asked to stop the run since the last call; None: none has.
+        """
+
+    def take_resume(self) -> bool:
+        """Whether the client in command has asked to resume since the last call."""
+
+    def __repr__(self) -> str: ...
+
+def link_address(address: str) -> str:
+    """
+    An address of a server in full: 'unix:/PATH' or 'tcp:127.0.0.1:PORT'. Raises ValueError that says what is allowed.
+    """
+
+def link_token(address: str) -> str:
+    """
+    The token that a server at this address has left for this user. Raises OSError where there is none.
+    """
+
+def link_messages() -> list[dict[str, Any]]:
+    """All messages of the protocol, with their fields."""
+
+link_version: int = 1
+
+link_magic: int = 1414743123
+
+class StreamLimiter:
+    """
+    The command nearest to the wanted one that a robot accepts which judges each command of a stream by the commands before
+    it: p+ = p + T (v + T a+) with a+ within jerk and acceleration of what the robot says it goes on from, and v+ within the
+    velocity limits. limits: JointLimits; end_deceleration, end_offset (nv,): D, o of velocity limits that fall to
+    sqrt(2 D (q_max - q)) - o towards the ends of the joints; margin: share of every limit that stays unused; period [s].
+    Raises ValueError on wrong shapes and limits that are not positive.
+    """
+
+    def __init__(self, limits: JointLimits, period: float, *, end_deceleration: numpy.typing.ArrayLike | None = None, end_offset: numpy.typing.ArrayLike | None = None, margin: float = 0.05) -> None: ...
+
+    def begin(self, position: numpy.typing.ArrayLike, torque: numpy.typing.ArrayLike) -> None:
+        """
+        A stream begins: the robot rests at `position` and holds `torque` (nv,).
+        """
+
+    def limit_positions(self, told: Sequence[numpy.typing.ArrayLike], wanted: Sequence[numpy.typing.ArrayLike]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The positions (nv,) to send. told, wanted: position, velocity, acceleration (nv,) that the robot goes on from (NaN: what was
+        sent), and that are wanted at the end of the period.
+        """
+
+    def limit_velocities(self, told: Sequence[numpy.typing.ArrayLike], wanted: Sequence[numpy.typing.ArrayLike]) -> numpy.typing.NDArray[numpy.float64]:
+        """The same of velocities."""
+
+    def limit_torques(self, told: numpy.typing.ArrayLike, wanted: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """The torques (nv,) to send; told: what the robot holds."""
+
+    @property
+    def change(self) -> float:
+        """
+        Largest difference of a joint between the last command and the wanted one.
+        """
+
+class RobotRequest:
+    """What a driver says to a robot."""
+
+    @property
+    def kind(self) -> str:
+        """
+        "start", "command", "stop", or "gone" where the connection of the driver in control has ended.
+        """
+
+    @property
+    def output(self) -> str:
+        """
+        Of start and command: "torque", "acceleration", "velocity" or "position".
+        """
+
+    @property
+    def sequence(self) -> int:
+        """Number of the message."""
+
+    @property
+    def cycle(self) -> int:
+        """Of the state that a command answers."""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) of a command, finite."""
+
+class RobotPort:
+    """
+    Robot's side of a link: a Unix domain socket or a port of this machine's loopback, where drivers and viewers connect. All are told
+    what the robot is and how it is; one of them controls it. Who breaks the protocol is told why and cut off. Messages:
+    cpp/include/sidestep/link/robot_messages.hpp.
+    """
+
+    def __init__(self, address: str, *, name: str, joints: Sequence[str], limits: JointLimits, outputs: Sequence[str], period: float, real_time: bool = True, when_silent: str = 'not told') -> None:
+        """
+        address: "unix:/PATH", a name, "tcp:PORT" or "tcp:127.0.0.1:PORT". The others: see RobotDescription. Raises ValueError on an address
+        or a value that is not allowed, OSError where the address is taken.
+        """
+
+    def receive(self, timeout: float) -> RobotRequest | None:
+        """
+        The next RobotRequest, waiting for at most `timeout` [s]; None: there was none. Ctrl-C raises.
+        """
+
+    def send_state(self, cycle: int, time: float, *, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, torque: numpy.typing.ArrayLike | None = None, mode: int = 1, taken: int = 0, taken_cycle: int = 0, lost_cycles: int = 0, told_position: numpy.typing.ArrayLike | None = None, told_velocity: numpy.typing.ArrayLike | None = None, told_acceleration: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Tells everybody how the robot is: vectors (nv,); mode: 0 nobody moves it yet, 1 a driver does, 2 nobody any more, 3 it has
+        stopped itself; taken: number of the newest command that moves it, 0: none, since taken_cycle; lost_cycles: so far without a command.
+        """
+
+    def send_objects(self, names: Sequence[str], poses: numpy.typing.ArrayLike) -> None:
+        """
+        Tells viewers where objects are: poses (N, 7), position [m] and quaternion (w, x, y, z) in the world.
+        """
+
+    def stop(self, words: str) -> None:
+        """
+        Tells the driver in control that the robot has stopped itself, and why.
+        """
+
+    @property
+    def address(self) -> str:
+        """As text, with the port that was free."""
+
+    @property
+    def num_connections(self) -> int:
+        """Drivers and viewers that are connected."""
+
+    @property
+    def is_controlled(self) -> bool:
+        """Whether one of them controls the robot."""
+
+    @property
+    def refusals(self) -> list[str]:
+        """Why connections were cut off, the last ones first; at most 16."""
+
+class SimulatorDriver(NativeDriver):
+    """
+    Drives a robot that speaks the messages of a RobotPort, as the simulator of `sidestep simulate` does, without Python in the loop.
+    """
+
+    def __init__(self, address: str, *, timeout: float = 5.0) -> None:
+        """
+        address: as that of a RobotPort; timeout: for the robot's first message [s]. Raises OSError where nobody listens, RuntimeError
+        where no robot answers.
+        """
+
+    def stop(self) -> None:
+        """
+        Ends control: the robot comes to rest and holds. Not while a run goes on.
+        """
+
+    def close(self) -> None:
+        """Ends the connection. Not while a run goes on."""
+
+    @property
+    def delay(self) -> float:
+        """
+        From a state to the cycle in which its command moves the robot [s]; with torque or acceleration output, states that are read
+        are moved on by so much.
         """
 
 class CollisionDensity(Embedding):

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.drivers.franka_server import arm_alone
 from sidestep.robot import tip_of
 from sidestep.simulation.model import build_model
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from franka_server import arm_alone
 from plant import Plant, SimulatedArm, add_payload, combined, dynamics
 from plants import figures
 from policy import Policy

@@ -5,28 +5,46 @@ import json
 import pytest
 
 from sidestep.bench import RealTimeBenchSettings, run_real_time_bench
-from sidestep.bench.real_time import BESIDE
+from sidestep.bench.real_time import BESIDE, CLOCK, RECORDER
 from sidestep.cli import main
 
 
 def test_every_row_is_of_what_was_asked_for():
     told = []
     document = run_real_time_bench(
-        RealTimeBenchSettings(robot="planar2", points=50, seconds=0.4, refresh=50.0),
+        RealTimeBenchSettings(robot="planar2", points=50, seconds=0.4, refresh=50.0, camera=False),
         progress=lambda *news: told.append(news),
     )
-    assert [row["beside"] for row in document["results"]] == list(BESIDE)
-    assert [news[:2] for news in told] == [(0, 2), (1, 2)]
+    assert [row["beside"] for row in document["results"]] == [*BESIDE, RECORDER]
+    assert [news[:2] for news in told] == [(0, 4), (1, 4), (2, 4), (3, 4)]
     for row in document["results"]:
-        assert row["searches"] >= 0
         assert row["steps"] == sum(row["late_histogram"]["counts"]) == 400
         in_time = row["late_us"]["max"] + row["step_us"]["max"] <= 1000.0
         assert row["missed"] == 0 if in_time else row["missed"] <= 400
-        assert 0.0 < row["step_us"]["median"] <= row["step_us"]["p99.9"] <= row["step_us"]["max"]
+        if row["beside"] != CLOCK:
+            assert row["searches"] >= 0
+            assert 0.0 < row["step_us"]["median"] <= row["step_us"]["p99.9"] <= row["step_us"]["max"]
         assert 0.0 < row["late_us"]["median"] <= row["late_us"]["max"]
-    clouds = [row["clouds"] for row in document["results"]]
-    assert clouds[0] == 0
-    assert 2 <= clouds[1] <= 25  # 20, fewer on a busy machine
+    _, goals, clouds, recorded = document["results"]
+    assert goals["clouds"] == 0
+    assert 2 <= clouds["clouds"] <= 25  # 20, fewer on a busy machine
+    record = recorded["record"]
+    assert record["replay_equal"]
+    assert record["steps"] >= 400
+    assert record["lost"] == 0
+    assert 1e6 < record["bytes_a_minute"] < 1e9
+
+
+def test_rows_are_chosen_by_name():
+    settings = RealTimeBenchSettings(
+        robot="planar2", points=20, seconds=0.1, camera=False, rows=("recorder", "clock")
+    )
+    document = run_real_time_bench(settings)
+    assert [row["beside"] for row in document["results"]] == [CLOCK, RECORDER]
+    with pytest.raises(ValueError, match="row is 'tea'; there are clock, goals, clouds, recorder"):
+        RealTimeBenchSettings(rows=("tea",))
+    with pytest.raises(ValueError, match="size is '1x1'; there are 848x480, 424x240"):
+        RealTimeBenchSettings(size="1x1")
 
 
 def test_the_command_writes_the_same(capsys, monkeypatch):
@@ -42,6 +60,7 @@ def test_the_command_writes_the_same(capsys, monkeypatch):
             "20",
             "--seconds",
             "0.1",
+            "--no-camera",
             "--json",
             "-",
         ],
@@ -52,7 +71,7 @@ def test_the_command_writes_the_same(capsys, monkeypatch):
     document = json.loads(capsys.readouterr().out)
     assert document["benchmark"] == "realtime"
     assert document["points"] == 20
-    assert [row["steps"] for row in document["results"]] == [100] * 2
+    assert [row["steps"] for row in document["results"]] == [100] * 4
 
 
 @pytest.mark.parametrize("name", ["points", "seconds", "refresh"])

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from sidestep.bench.recordings import FOLDER_VARIABLE, cases, record_all, replay_all
+from sidestep.bench.recorded_cases import cases
+from sidestep.bench.recordings import FOLDER_VARIABLE, record_all, replay_all
 
 
 def test_cases_are_recorded_and_replayed_equal(tmp_path, monkeypatch):
@@ -16,9 +17,9 @@ def test_cases_are_recorded_and_replayed_equal(tmp_path, monkeypatch):
     )
     assert left_out == []
     assert [path.relative_to(folder) for path in paths] == [
-        Path("trajectory/fr3-001.step"),
-        Path("trajectory/fr3-002.step"),
-        Path("twist/fr3-001.step"),
+        Path("trajectory/fr3-001.mcap"),
+        Path("trajectory/fr3-002.mcap"),
+        Path("twist/fr3-001.mcap"),
     ]
     assert told[-1] == (2, 2, "done")
     results = replay_all([folder], jobs=2)
@@ -27,6 +28,12 @@ def test_cases_are_recorded_and_replayed_equal(tmp_path, monkeypatch):
     ]
     with pytest.raises(ValueError, match="has recordings already"):
         record_all(folder)
+
+
+def test_black_boxes_in_a_folder_are_passed_over(tmp_path):
+    (tmp_path / "blackbox-20261127-120000-fr3-000001.mcap").write_bytes(b"")
+    with pytest.raises(ValueError, match=r"there is no recording \(\*\.mcap\)"):
+        replay_all([tmp_path], jobs=1)
 
 
 def test_an_unknown_case_is_refused_with_those_that_there_are(tmp_path):

@@ -2,16 +2,15 @@
 
 import json
 import os
-import struct
 import subprocess
 import sys
 import threading
 import time
-import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import NonSeekingReader
 from typer.testing import CliRunner
 
 import sidestep as ss
@@ -22,12 +21,13 @@ from sidestep.controller import (
     LookAheadSettings,
     read_recording_header,
 )
+from sidestep.loop import Loop
 from sidestep.obstacles import Box, Cylinder
+from support.mcap_bytes import FRAME, MESSAGE, messages, sign
 
 Q = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785])
 FINGERS = ["fr3_leftfinger", "fr3_rightfinger"]
-HEADER = 12  # [B] tag and size of a chunk
-BEFORE_Q = 20  # [B] in a step: number, time, size of q
+BEFORE_Q = FRAME + MESSAGE + 20  # [B] in the record of a step: its number, time, size of q
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def drive(controller):
 @pytest.fixture(scope="module")
 def recorded(arm, tmp_path_factory):
     """A recording of `drive`, and its number of steps."""
-    path = tmp_path_factory.mktemp("recordings") / "drive.step"
+    path = tmp_path_factory.mktemp("recordings") / "drive.mcap"
     controller = controller_of(arm)
     with controller.record(path) as recording:
         steps = drive(controller)
@@ -104,17 +104,8 @@ def recorded(arm, tmp_path_factory):
     return path, steps
 
 
-def chunks(data):
-    """Where each chunk begins and ends, and its tag."""
-    begin = 8
-    while begin < len(data):
-        (size,) = struct.unpack_from("<Q", data, begin + 4)
-        yield begin, begin + HEADER + size + 4, bytes(data[begin : begin + 4])
-        begin += HEADER + size + 4
-
-
-def step_chunks(data):
-    return [(begin, end) for begin, end, tag in chunks(data) if tag == b"STEP"]
+def step_records(data):
+    return messages(data, "/sidestep/step")
 
 
 def assert_equal(result, steps):
@@ -127,7 +118,7 @@ def assert_equal(result, steps):
 
 @pytest.mark.parametrize("output", ["acceleration", "torque", "position", "velocity"])
 def test_a_replay_of_every_kind_of_request_gives_the_same_commands(arm, tmp_path, output):
-    path = tmp_path / "drive.step"
+    path = tmp_path / "drive.mcap"
     controller = controller_of(arm, output=output)
     with controller.record(path):
         steps = drive(controller)
@@ -138,15 +129,15 @@ def test_what_was_set_before_the_recording_began_is_in_it(arm, tmp_path):
     controller = controller_of(arm)
     controller.set_obstacles(balls())
     controller.set_goal(Q + 0.3)
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         moved(controller, Q, np.zeros(7), 50)
-    assert_equal(ss.replay(tmp_path / "run.step"), 50)
+    assert_equal(ss.replay(tmp_path / "run.mcap"), 50)
 
 
 def test_mass_matrices_and_unusable_states(arm, tmp_path):
     controller = controller_of(arm, output="torque")
     q, v = Q, np.zeros(7)
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         controller.set_goal(Q + 0.2)
         for k in range(60):
             seen = np.full(7, np.nan) if k == 20 else q
@@ -154,12 +145,12 @@ def test_mass_matrices_and_unusable_states(arm, tmp_path):
             command = controller.step(seen, v, mass, arm.bias(q, v)) if k % 3 else controller.step(seen, v)
             v = v + 0.001 * command.acceleration
             q = q + 0.001 * v
-    assert_equal(ss.replay(tmp_path / "run.step"), 60)
+    assert_equal(ss.replay(tmp_path / "run.mcap"), 60)
 
 
 def test_a_restart_and_a_pause_by_the_clock(arm, tmp_path):
     """What a step reads of the machine's clock is an input: a replay has no pause, and begins anew all the same."""
-    path = tmp_path / "run.step"
+    path = tmp_path / "run.mcap"
     controller = controller_of(arm, output="position")
     controller.set_obstacles(ss.Obstacles.none())
     with controller.record(path):
@@ -186,11 +177,56 @@ def test_obstacles_that_moved_before_they_were_set(arm, tmp_path):
     )
     cloud.advance(2.0)
     controller = controller_of(arm)
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         controller.set_obstacles(cloud)
         controller.set_goal(Q + 0.3)
         moved(controller, Q, np.zeros(7), 60)
-    assert_equal(ss.replay(tmp_path / "run.step"), 60)
+    assert_equal(ss.replay(tmp_path / "run.mcap"), 60)
+
+
+def camera_clouds(sets, rng):
+    """Clouds of which a part changes from one to the next, in an order that changes, with a ball that moves."""
+    cloud = rng.uniform(-1.0, 1.0, (800, 3)).astype(np.float32)
+    cloud = cloud[np.linalg.norm(cloud[:, :2], axis=1) > 0.4]
+    radii = rng.uniform(0.005, 0.01, len(cloud)).astype(np.float32)
+    made = []
+    for k in range(sets):
+        changed = rng.integers(0, len(cloud), 30)
+        cloud[changed] += rng.normal(0.0, 0.01, (30, 3)).astype(np.float32)
+        order = np.roll(np.arange(len(cloud)), 7 * k)[: len(cloud) - 10 * (k % 3)]
+        velocities = np.zeros((len(order), 3))
+        velocities[: 20 * (k % 4)] = (0.0, -0.1, 0.0)
+        made.append((cloud[order], radii[order], velocities))
+    return made
+
+
+def test_clouds_that_change_little_are_replayed_and_take_few_bytes(arm, tmp_path):
+    clouds = camera_clouds(40, np.random.default_rng(5))
+    controller = controller_of(arm)
+    path = tmp_path / "run.mcap"
+    with controller.record(path):
+        controller.set_goal(Q + 0.3)
+        q, v = Q, np.zeros(7)
+        for k, (points, radii, velocities) in enumerate(clouds):
+            as_told = ss.Obstacles(points, radii=radii, velocities=velocities)
+            controller.set_obstacles(as_told, source="told", time=0.02 * k, valid_for=1.0)
+            resting = ss.Obstacles(points + 0.5, radii=radii)  # whose velocities are found
+            controller.set_obstacles(resting, source="resting", time=0.02 * k)
+            if k % 10 == 9:
+                controller.remove_obstacles("resting")
+            for n in range(20):
+                command = controller.step(q, v, time=0.02 * k + 0.001 * n)
+                v = v + 0.001 * command.acceleration
+                q = q + 0.001 * v
+    assert_equal(ss.replay(path), 800)
+    run = ss.load_recording(path)
+    assert run.complete
+    assert run.damage == ""
+    with path.open("rb") as stream:
+        messages_of_sets = NonSeekingReader(stream).iter_messages(topics=["/sidestep/obstacles"])
+        size = sum(len(message.data) for _, _, message in messages_of_sets)
+    in_full = 68 * sum(2 * len(points) for points, _, _ in clouds)  # [B]
+    assert size < 0.35 * in_full
 
 
 def test_held_objects_and_other_arms(arm, tmp_path):
@@ -200,7 +236,7 @@ def test_held_objects_and_other_arms(arm, tmp_path):
     table = Box((0.3, 0.3, 0.04), pose=at(cup[0], cup[1], cup[2] - 0.071), name="table")
     held = {"link": "fr3_hand", "mass": 0.3, "may_touch": FINGERS}
     q, v, lifted = Q, np.zeros(7), False
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         controller.set_obstacles([table])
         q, v = moved(controller, q, v, 20)
         cup_in_hand = np.linalg.inv(hand) @ at(*cup)
@@ -220,7 +256,7 @@ def test_held_objects_and_other_arms(arm, tmp_path):
         controller.set_arm(arm)
         moved(controller, q, v, 20)
     assert lifted
-    result = ss.replay(tmp_path / "run.step")
+    result = ss.replay(tmp_path / "run.mcap")
     assert result.equal
     assert result.notes == []
 
@@ -258,7 +294,7 @@ def run_beside_workers(arm, path, output, pace):
 @pytest.mark.parametrize("output", ["acceleration", "torque"])
 def test_results_of_workers_are_replayed_at_the_steps_that_took_them(arm, tmp_path, output):
     for pace in PACES:
-        path = tmp_path / f"{pace}.step"
+        path = tmp_path / f"{pace}.mcap"
         seen = run_beside_workers(arm, path, output, pace)
         assert_equal(ss.replay(path), 500)
         if seen == {"avoiding", "on_path"}:  # what both found was followed
@@ -270,14 +306,14 @@ def test_results_of_workers_are_replayed_at_the_steps_that_took_them(arm, tmp_pa
 def test_a_posture_for_a_pose_is_replayed(arm, tmp_path):
     controller = ss.Controller(arm)
     controller.set_obstacles(ss.Obstacles.none())
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         controller.set_goal(ss.PoseGoal(arm.robot, "fr3_hand", arm.robot.pose(Q + 0.2, "fr3_hand")))
         q, v, steps = Q, np.zeros(7), 0
         while controller.target is None or steps < 300:
             q, v = moved(controller, q, v, 1)
             steps += 1
             time.sleep(0.001)
-    assert_equal(ss.replay(tmp_path / "run.step"), steps)
+    assert_equal(ss.replay(tmp_path / "run.mcap"), steps)
 
 
 @pytest.mark.slow
@@ -296,30 +332,33 @@ def test_requests_of_other_threads_are_replayed_at_the_steps_that_took_them(arm,
             controller.set_goal(q)
             time.sleep(0.002)
 
-    with controller.record(tmp_path / "run.step"):
+    with controller.record(tmp_path / "run.mcap"):
         thread = threading.Thread(target=ask)
         thread.start()
-        run = ss.RealTimeRun(controller, Q, np.zeros(7), steps=1500)
+        run = Loop(controller, ss.drivers.Ideal(controller.arm, Q), duration=1.5)
+        run.start()
         time.sleep(0.5)
         controller.attach("rod", Cylinder(0.02, 0.2), link="fr3_hand", pose=at(0, 0, 0.2), may_touch=FINGERS)
         controller.detach("rod")
-        run.finish()
+        report = run.finish()
         over.set()
         thread.join()
-    assert_equal(ss.replay(tmp_path / "run.step"), 1500)
+    result = ss.replay(tmp_path / "run.mcap")
+    assert result.steps >= report.cycles >= 1500
+    assert_equal(result, result.steps)
 
 
 def test_a_recording_that_was_cut_off_is_read_up_to_its_last_whole_step(recorded, tmp_path):
     data = recorded[0].read_bytes()
-    steps = step_chunks(data)
+    steps = step_records(data)
     for cut, whole in (
         (steps[99][1], 100),
         (steps[100][1] - 1, 100),
         (steps[100][0] + 5, 100),
         (steps[0][0], 0),
     ):
-        (tmp_path / "cut.step").write_bytes(data[:cut])
-        result = ss.replay(tmp_path / "cut.step")
+        (tmp_path / "cut.mcap").write_bytes(data[:cut])
+        result = ss.replay(tmp_path / "cut.mcap")
         assert result.equal
         assert not result.complete
         assert result.steps == whole
@@ -327,10 +366,10 @@ def test_a_recording_that_was_cut_off_is_read_up_to_its_last_whole_step(recorded
 
 def test_a_bit_that_flipped_on_the_disk_is_found(recorded, tmp_path):
     data = bytearray(recorded[0].read_bytes())
-    begin, _ = step_chunks(data)[149]
-    data[begin + HEADER + BEFORE_Q] ^= 1
-    (tmp_path / "flipped.step").write_bytes(data)
-    result = ss.replay(tmp_path / "flipped.step")
+    begin, _ = step_records(data)[149]
+    data[begin + BEFORE_Q] ^= 1
+    (tmp_path / "flipped.mcap").write_bytes(data)
+    result = ss.replay(tmp_path / "flipped.mcap")
     assert not result.equal
     assert result.steps == 149
     assert f"the bytes from {begin} on, after step 149" in result.damage
@@ -338,11 +377,11 @@ def test_a_bit_that_flipped_on_the_disk_is_found(recorded, tmp_path):
 
 def test_an_input_that_is_another_in_its_last_bit_is_named_by_step_and_field(recorded, tmp_path):
     data = bytearray(recorded[0].read_bytes())
-    begin, end = step_chunks(data)[149]
-    data[begin + HEADER + BEFORE_Q] ^= 1  # the last bit of q[0] in step 150
-    data[end - 4 : end] = struct.pack("<I", zlib.crc32(data[begin : end - 4]))
-    (tmp_path / "changed.step").write_bytes(data)
-    result = ss.replay(tmp_path / "changed.step")
+    begin, end = step_records(data)[149]
+    data[begin + BEFORE_Q] ^= 1  # the last bit of q[0] in step 150
+    sign(data, begin, end)
+    (tmp_path / "changed.mcap").write_bytes(data)
+    result = ss.replay(tmp_path / "changed.mcap")
     assert not result.equal
     assert result.damage == ""
     assert result.steps == result.difference.step == 150
@@ -373,9 +412,9 @@ def test_the_header_has_arm_and_settings(arm, tmp_path):
     settings = ss.ControllerSettings(
         synchronous=True, seed=2**63 + 1, look_ahead=None, barriers=BarrierSettings(activation=0.07)
     )
-    with ss.Controller(arm, settings).record(tmp_path / "run.step"):
+    with ss.Controller(arm, settings).record(tmp_path / "run.mcap"):
         pass
-    header = read_recording_header(tmp_path / "run.step")
+    header = read_recording_header(tmp_path / "run.mcap")
     assert header.arm.content_hash == arm.content_hash
     assert repr(header.settings) == repr(settings)
     assert header.sidestep_version == ss.__version__
@@ -386,21 +425,21 @@ def test_recording_begins_before_the_first_step_and_once(arm, tmp_path):
     controller = controller_of(arm)
     controller.step(Q, np.zeros(7))
     with pytest.raises(RuntimeError, match=r"before the first step, but it has made 1"):
-        controller.record(tmp_path / "late.step")
+        controller.record(tmp_path / "late.mcap")
     controller = controller_of(arm)
-    controller.record(tmp_path / "once.step").stop()
+    controller.record(tmp_path / "once.mcap").stop()
     with pytest.raises(RuntimeError, match="recorded already"):
-        controller.record(tmp_path / "twice.step")
+        controller.record(tmp_path / "twice.mcap")
 
 
 def test_what_is_no_recording_is_refused(tmp_path):
-    (tmp_path / "text.step").write_text("a text that is long enough")
+    (tmp_path / "text.mcap").write_text("a text that is long enough")
     with pytest.raises(ValueError, match="it is not a recording"):
-        ss.replay(tmp_path / "text.step")
+        ss.replay(tmp_path / "text.mcap")
     with pytest.raises(FileNotFoundError):
-        ss.replay(tmp_path / "none.step")
+        ss.replay(tmp_path / "none.mcap")
     with pytest.raises(FileNotFoundError):
-        controller_of(ss.Arm.load("planar2")).record(tmp_path / "no" / "folder.step")
+        controller_of(ss.Arm.load("planar2")).record(tmp_path / "no" / "folder.mcap")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
@@ -410,12 +449,13 @@ def test_a_full_disk_is_told_when_the_recording_ends(arm):
     moved(controller, Q, np.zeros(7), 5)
     with pytest.raises(OSError, match="No space left"):
         recording.stop()
+    moved(controller, Q, np.zeros(7), 5)  # steps go on
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
 def test_steps_do_not_wait_for_a_slow_disk_and_what_is_lost_is_counted(arm, tmp_path):
-    pipe = tmp_path / "slow.step"
+    pipe = tmp_path / "slow.mcap"
     os.mkfifo(pipe)
     disk = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # takes nothing yet
     settings = ss.ControllerSettings(output="torque", planner=None, look_ahead=None)
@@ -447,15 +487,15 @@ def test_steps_do_not_wait_for_a_slow_disk_and_what_is_lost_is_counted(arm, tmp_
     os.close(disk)
     assert summary.lost > 0
     assert summary.steps + summary.lost == steps
-    (tmp_path / "read.step").write_bytes(b"".join(taken))
-    result = ss.replay(tmp_path / "read.step")
+    (tmp_path / "read.mcap").write_bytes(b"".join(taken))
+    result = ss.replay(tmp_path / "read.mcap")
     assert result.equal
     assert result.complete
     assert (result.steps, result.lost) == (summary.steps, summary.lost)
 
 
 def test_a_program_that_is_killed_leaves_what_it_has_recorded(tmp_path):
-    path = tmp_path / "killed.step"
+    path = tmp_path / "killed.mcap"
     program = f"""
 import os, time
 import numpy as np
@@ -493,11 +533,11 @@ def test_the_command_line_tells_equal_from_different(recorded, tmp_path):
     assert "all commands are equal bit for bit" in equal.output
 
     data = bytearray(path.read_bytes())
-    begin, end = step_chunks(data)[149]
-    data[begin + HEADER + BEFORE_Q] ^= 1
-    data[end - 4 : end] = struct.pack("<I", zlib.crc32(data[begin : end - 4]))
-    (tmp_path / "changed.step").write_bytes(data)
-    (tmp_path / "same.step").write_bytes(path.read_bytes())
+    begin, end = step_records(data)[149]
+    data[begin + BEFORE_Q] ^= 1
+    sign(data, begin, end)
+    (tmp_path / "changed.mcap").write_bytes(data)
+    (tmp_path / "same.mcap").write_bytes(path.read_bytes())
     other = run.invoke(app, ["replay", str(tmp_path), "--json", str(tmp_path / "figures.json"), "--quiet"])
     assert other.exit_code == 1
     assert other.output == ""

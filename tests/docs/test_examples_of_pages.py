@@ -1,5 +1,7 @@
 """Python in the pages runs as it stands, prints what stands below it, and commands in them exist."""
 
+import ast
+import importlib
 import re
 import shutil
 from pathlib import Path
@@ -55,6 +57,36 @@ def test_examples_run_with_the_extras_that_the_page_names(
             expected += block["output"] or ""
     done = run("\n".join(program), folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, expected), done.stderr
+
+
+def missing_names(code: str) -> list[str]:
+    """Attributes of what a program imports that there are not, such as ss.Sphere.at."""
+    tree, known, missing = ast.parse(code), dict[str, Any](), []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            known |= {name.asname or name.name: importlib.import_module(name.name) for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(node.module or "")
+            known |= {name.asname or name.name: getattr(module, name.name) for name in node.names}
+    for node in ast.walk(tree):
+        chain, at = [], node
+        while isinstance(at, ast.Attribute):
+            chain.append(at.attr)
+            at = at.value
+        if chain and isinstance(at, ast.Name) and at.id in known:
+            found = known[at.id]
+            for name in reversed(chain):
+                if not hasattr(found, name):
+                    missing.append(f"{at.id}.{'.'.join(reversed(chain))}")
+                    break
+                found = getattr(found, name)
+    return missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_names_exist_in_blocks_that_are_not_run(page: Path) -> None:
+    assert missing_names("import sidestep as ss\nss.Sphere.at([0, 0, 0])\nss.Sphere(0.1)") == ["ss.Sphere.at"]
+    assert [name for block in blocks(page) if block["reason"] for name in missing_names(block["code"])] == []
 
 
 def test_every_how_to_has_short_code() -> None:

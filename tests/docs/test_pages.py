@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 MAKE = runpy.run_path(str(DOCS / "make_reference.py"))
 
 
-@pytest.mark.parametrize("name", ["python.md", "settings.md", "command-line.md"])
+@pytest.mark.parametrize("name", ["python.md", "settings.md", "command-line.md", "protocol.md"])
 def test_page_is_what_its_script_writes(name: str) -> None:
     page = DOCS / "reference" / name
     assert page.read_text(encoding="utf-8") == MAKE["pages"]()[page], "run: python docs/make_reference.py"

@@ -3,7 +3,8 @@
 // Everything that a control program needs.
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
-#include "sidestep/controller/real_time.hpp"
+#include "sidestep/loop/ideal_driver.hpp"
+#include "sidestep/loop/loop.hpp"
 #include "sidestep/perception/perception.hpp"
 #include "sidestep/arm/arm.hpp"
 #include "sidestep/scene/obstacles.hpp"

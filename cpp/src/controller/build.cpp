@@ -8,7 +8,11 @@
 
 namespace sidestep {
 
-Controller::Impl::StepState::StepState(Eigen::Index nv) : wanted(Eigen::VectorXd::Zero(nv)), coupling(wanted), places(nv) {}
+Controller::Impl::StepState::StepState(Eigen::Index nv)
+    : told{false, Eigen::VectorXd::Zero(nv), Eigen::VectorXd::Zero(nv), Eigen::VectorXd::Zero(nv)},
+      wanted(Eigen::VectorXd::Zero(nv)),
+      coupling(wanted),
+      places(nv) {}
 
 Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool works)
     : model(std::move(a), std::move(s)),

@@ -32,6 +32,7 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   taken_.request = inputs_.request().handed_over();
   taken_.obstacles = sources_.handed_over();
   board_.guarded([&] { look_ahead_.go_on_from(before.look_ahead_); });
+  state_.paused = before.state_.paused;
   dynamics_.go_on_from(before.dynamics_);
   touch_.go_on_from(before.touch_);
   if (dynamics_.has_model() && measured_.was_known()) {
@@ -52,6 +53,29 @@ void Controller::Impl::restart() noexcept {
   touch_.release();
 }
 
+void Controller::Impl::pause(bool paused) noexcept {
+  taken_.pauses = paused != state_.paused;
+  state_.paused = paused;
+}
+
+void Controller::Impl::continue_from(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) noexcept {
+  taken_.is_told = state_.told.is = true;
+  state_.told.position = q;
+  state_.told.velocity = v;
+  state_.told.acceleration = a;
+}
+
+void Controller::continue_from(ConstVectorRef position, ConstVectorRef velocity, ConstVectorRef acceleration) noexcept {
+  const Eigen::Index nv = told_.position.size();
+  if (position.size() == nv && velocity.size() == nv && acceleration.size() == nv && position.allFinite() &&
+      velocity.allFinite() && acceleration.allFinite() && settings_.output == ControllerSettings::Output::position) {
+    told_.is = true;
+    told_.position = position;
+    told_.velocity = velocity;
+    told_.acceleration = acceleration;
+  }
+}
+
 void Controller::take_over() noexcept {
   Impl* next = next_.load(std::memory_order_relaxed) == nullptr ? nullptr : next_.exchange(nullptr, std::memory_order_acquire);
   if (next == nullptr && impl_->lifted.load(std::memory_order_relaxed) != nullptr && impl_->is_lifted()) {
@@ -68,6 +92,11 @@ void Controller::take_over() noexcept {
   }
   if (restarts_.load(std::memory_order_relaxed) && restarts_.exchange(false, std::memory_order_acquire)) {
     impl_->restart();
+  }
+  impl_->pause(paused_.load(std::memory_order_acquire));
+  if (told_.is) {
+    told_.is = false;
+    impl_->continue_from(told_.position, told_.velocity, told_.acceleration);
   }
 }
 
@@ -100,8 +129,10 @@ void Controller::install(std::unique_ptr<Impl> fresh, const Arm& whole, std::vec
     if (lifted != nullptr) {
       lifted->arm_number = ++arm_count_;
     }
-    if (recorder_) {
-      recorder_->add_arm(*fresh, held);
+    for (Recorder* const recorder : {recorder_.get(), box_.get()}) {
+      if (recorder != nullptr) {
+        recorder->add_arm(*fresh, held);
+      }
     }
     fresh->take_requests_of(last);
     if (lifted != nullptr) {

@@ -1,8 +1,6 @@
 // The public face, and what is set from any thread.
 #include "sidestep/controller/controller.hpp"
 
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "impl.hpp"
@@ -32,6 +30,7 @@ Controller::Controller(Arm arm, ControllerSettings settings, bool workers)
     : settings_(std::move(settings)),
       command_(arm.num_coordinates()),
       refused_(arm.num_coordinates()),
+      told_{false, command_.position, command_.position, command_.position},
       registry_(std::make_unique<SourceRegistry>(settings_)),
       impl_(std::make_unique<Impl>(arm, settings_, command_, workers)),
       newest_(impl_.get()),
@@ -46,8 +45,7 @@ Controller::~Controller() {
 
 Controller::ClaimedController::ClaimedController(Controller& controller) : controller_(&controller) {
   if (controller.in_use_.exchange(true, std::memory_order_acquire)) {
-    throw std::runtime_error(
-        "the controller is in use: a RealTimeRun or another thread steps it; stop it first, or wait for its end");
+    throw std::runtime_error("the controller is in use: a Loop or another thread steps it; stop it first, or wait for its end");
   }
 }
 
@@ -114,9 +112,13 @@ const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const E
   if (!stepper_.enter()) {
     return refused_;
   }
-  Recorder* const recorder = records_.load(std::memory_order_acquire);
+  Recorder* const recorder = records_.load();
+  Recorder* const box = boxes_.load();
   if (recorder != nullptr) {
     recorder->begin_step(q, v, mass_matrix, bias, time);
+  }
+  if (box != nullptr) {
+    box->begin_step(q, v, mass_matrix, bias, time);
   }
   take_over();
   const Command& command = impl_->step(q, v, {mass_matrix, bias}, time);
@@ -125,41 +127,14 @@ const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const E
   if (impl_->measured().was_known()) {
     history_.put(this->time(), impl_->measured().position());
   }
+  if (box != nullptr) {
+    box->end_step(*impl_);
+  }
   if (recorder != nullptr) {
     recorder->end_step(*impl_);
   }
   stepper_.leave();
   return command;
-}
-
-void Controller::record(const std::filesystem::path& path) {
-  const std::lock_guard lock(setters_);
-  if (recorder_) {
-    throw std::runtime_error("controller: it has been recorded already; make another controller for another recording");
-  }
-  recorder_ = std::make_unique<Recorder>(path, *impl_, setters_);
-  recorder_->note(newest());
-  if (newest_ != impl_.get()) {
-    recorder_->add_arm(*newest_, held_);
-  }
-  records_.store(recorder_.get(), std::memory_order_release);
-}
-
-RecordingSummary Controller::stop_recording() {
-  {
-    const std::lock_guard lock(setters_);
-    if (records_.exchange(nullptr) == nullptr) {
-      throw std::runtime_error("controller: nothing is recorded; begin with `record`");
-    }
-    recorder_->close();
-  }
-  return recorder_->finish();
-}
-
-void Controller::note_requests() {
-  if (recorder_) {
-    recorder_->note(newest());
-  }
 }
 
 const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }

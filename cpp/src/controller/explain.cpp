@@ -99,6 +99,9 @@ std::string Controller::Impl::explain_motion() const {
     }
     text += trajectory.empty() ? "" : trajectory + "; ";
   }
+  if (state_.paused && !sources_.is_stale()) {
+    return text + "paused: the arm rests until `resume`";
+  }
   const std::string activity = explain_activity(command_.activity, inputs_, sources_, model.settings);
   return text + (activity.empty() ? explain_way() : activity);
 }

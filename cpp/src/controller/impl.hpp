@@ -60,6 +60,9 @@ class Controller::Impl {
   const Command& step(ConstVectorRef q, ConstVectorRef v, const ToldDynamics& told, double time) noexcept;
   /// The next step with a usable state begins where the arm is.
   void restart() noexcept;
+  /// From this step on the arm rests, or goes on again.
+  void pause(bool paused) noexcept;
+  void continue_from(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) noexcept;
   /// Goes on where another one stopped: the target stays, a way to it is planned anew, and other requests go on. No allocation.
   void go_on_from(Impl& before) noexcept;
   bool is_lifted() const noexcept;
@@ -68,6 +71,7 @@ class Controller::Impl {
   const Obstacles& obstacles() const noexcept { return sources_.obstacles(); }
   const Sources& sources() const noexcept { return sources_; }
   const Tick& tick() const noexcept { return clock_.tick(); }
+  std::uint64_t num_steps() const noexcept { return state_.steps; }
   const MeasuredState& measured() const noexcept { return measured_; }
   const GeometricSystem::Workspace& workspace() const noexcept { return attractor_.at_reference(); }
   detail::PartResults part_results() const noexcept { return {state_.attraction, state_.program, solution_}; }
@@ -93,7 +97,8 @@ class Controller::Impl {
   /// What a step took over from other threads beside its requests: a recording keeps it, and a replay gives it again. Null: nothing.
   struct Taken {
     std::uint64_t request = 0, obstacles = 0;  // numbers when this arm took over; 0: it did not
-    bool restarts = false;
+    bool is_told = false;                      // what the drives go on from
+    bool restarts = false, pauses = false;     // the latter: it is paused and was not, or the other way round
     GoalFollower::Taken goal;
     const FoundActivations* activations = nullptr;
     const FoundTrajectory* trajectory = nullptr;
@@ -103,8 +108,10 @@ class Controller::Impl {
     explicit StepState(Eigen::Index nv);
 
     std::uint64_t steps = 0;
-    double next_look = 0.0;                                         // [s]
-    bool apart = false;                                             // the arm is not exactly where the reference is
+    double next_look = 0.0;  // [s]
+    bool apart = false;      // the arm is not exactly where the reference is
+    bool paused = false;
+    Told told;                                                      // what the drives go on from
     const Goal* followed = nullptr;                                 // Goal by which the reference is led.
     StepStatus attraction = StepStatus::invalid_state;              // how the attractor ended
     ProgramStatus program = ProgramStatus::fallback_invalid_input;  // how the program ended
@@ -122,8 +129,8 @@ class Controller::Impl {
   void begin_motion() noexcept;
   /// The arm touched something: it begins anew where it is, and waits.
   void judge_touch(const Tick& tick) noexcept;
-  /// The arm stops: the obstacles are old, or it touched something.
-  bool must_rest() const noexcept { return sources_.is_stale() || touch_.is_touched(); }
+  /// The arm stops: the obstacles are old, it touched something, or it is paused.
+  bool must_rest() const noexcept { return sources_.is_stale() || touch_.is_touched() || state_.paused; }
   /// Activation distances, shorter where the arm is led; `looks`: it is time to look for what moves.
   void update_activation_distances(bool looks, const Obstacles& obstacles) noexcept;
   /// Out of the way of what moves, in place of what is followed; and the pace that the look-ahead leaves.

@@ -1,5 +1,6 @@
 #include "recording_content.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -32,14 +33,13 @@ std::string in_words(std::int32_t value) {
   return number;
 }
 
-using Value = std::variant<double, std::int32_t, Eigen::VectorXd, std::vector<Limit>>;
-
-Value read_value(Decoder& in, FieldKind kind) {
+/// Passes a value of that kind over.
+void pass_over(Decoder& in, FieldKind kind) {
   switch (kind) {
-    case FieldKind::number: return in.take<double>();
-    case FieldKind::whole: return in.take<std::int32_t>();
-    case FieldKind::numbers: return in.take<Eigen::VectorXd>();
-    case FieldKind::limits: return in.take<std::vector<Limit>>();
+    case FieldKind::number: in.raw(sizeof(double)); return;
+    case FieldKind::whole: in.raw(sizeof(std::int32_t)); return;
+    case FieldKind::numbers: in.raw(sizeof(double) * in.take<std::uint32_t>()); return;
+    case FieldKind::limits: in.raw(sizeof(Limit) * in.take<std::uint32_t>()); return;
   }
   throw std::invalid_argument("a field of a command has an unknown kind");
 }
@@ -56,6 +56,49 @@ constexpr FieldKind kind_of() {
     static_assert(std::is_enum_v<T> || std::is_same_v<T, int> || std::is_same_v<T, bool>, "give this field a FieldKind");
     return FieldKind::whole;
   }
+}
+
+template <class T>
+T value_of(std::span<const std::byte> bytes) {
+  Decoder in(bytes);
+  if constexpr (kind_of<T>() == FieldKind::whole) {
+    return static_cast<T>(in.take<std::int32_t>());
+  } else {
+    return in.take<T>();
+  }
+}
+
+/// How a field that was recorded differs from what it is; empty: not.
+template <class T>
+std::optional<ReplayDifference> difference(const std::string& name, const T& was, const T& is) {
+  const auto differs = [](std::string field, std::string before, std::string now) {
+    return ReplayDifference{0, std::move(field), std::move(before), std::move(now)};
+  };
+  if constexpr (kind_of<T>() == FieldKind::number) {
+    if (!same(was, is)) {
+      return differs(name, in_full(was), in_full(is));
+    }
+  } else if constexpr (kind_of<T>() == FieldKind::whole) {
+    if (was != is) {
+      return differs(name, in_words<T>(static_cast<std::int32_t>(was)), in_words<T>(static_cast<std::int32_t>(is)));
+    }
+  } else if constexpr (kind_of<T>() == FieldKind::numbers) {
+    if (was.size() != is.size()) {
+      return differs(name, std::to_string(was.size()) + " entries", std::to_string(is.size()) + " entries");
+    }
+    for (Eigen::Index j = 0; j < is.size(); ++j) {
+      if (!same(was[j], is[j])) {
+        return differs(name + "[" + std::to_string(j) + "]", in_full(was[j]), in_full(is[j]));
+      }
+    }
+  } else if (was != is) {
+    const auto j = static_cast<std::size_t>(std::mismatch(was.begin(), was.end(), is.begin(), is.end()).first - was.begin());
+    const auto bits = [j](const std::vector<Limit>& limits) {
+      return j < limits.size() ? std::to_string(static_cast<unsigned>(limits[j])) : std::string("none");
+    };
+    return differs(name + "[" + std::to_string(j) + "]", bits(was), bits(is));
+  }
+  return std::nullopt;
 }
 
 /// The settings of each part with the beginning of their names, and those that may be left out.
@@ -96,59 +139,72 @@ std::vector<FieldRecord> fields_of_commands() {
   return fields;
 }
 
-std::optional<ReplayDifference> first_difference(const std::vector<FieldRecord>& fields, std::span<const std::byte> recorded,
-                                                 const Command& replayed) {
+void read_step_inputs(Decoder& in, StepInputs& s) {
+  in(s.number, s.time, s.q, s.v, s.dynamics);
+  if (s.dynamics) {
+    in(s.mass_matrix, s.bias);
+  }
+  in(s.arm, s.request, s.obstacles, s.request_before, s.obstacles_before);
+}
+
+std::span<const std::byte> command_of(std::span<const std::byte> step) {
+  if (step.size() < sizeof(CommandPlace)) {
+    throw std::invalid_argument("a part of it ends where more must follow");
+  }
+  const std::size_t end = step.size() - sizeof(CommandPlace);
+  const auto begin = Decoder(step.subspan(end)).take<CommandPlace>();
+  if (begin > end) {
+    throw std::invalid_argument("the command of a step begins after its end");
+  }
+  return step.subspan(begin, end - begin);
+}
+
+CommandReader::CommandReader(const std::vector<FieldRecord>& fields) {
+  const std::vector<FieldRecord> now = fields_of_commands();
+  num_fields_ = now.size();
+  for (const FieldRecord& field : fields) {
+    const auto same_field =
+        std::find_if(now.begin(), now.end(), [&](const auto& one) { return one.name == field.name && one.kind == field.kind; });
+    recorded_.push_back({field.kind, static_cast<std::size_t>(same_field - now.begin())});
+  }
+}
+
+std::vector<std::span<const std::byte>> CommandReader::split(std::span<const std::byte> recorded) const {
+  std::vector<std::span<const std::byte>> values(num_fields_ + 1);  // the last for what is none of them now
+  Decoder in(recorded);
+  for (const Recorded& one : recorded_) {
+    const std::span<const std::byte> begin = in.rest();
+    pass_over(in, one.kind);
+    values[one.field] = begin.first(begin.size() - in.rest().size());
+  }
+  return values;
+}
+
+void CommandReader::read(std::span<const std::byte> recorded, Command& command) const {
+  const auto values = split(recorded);
+  auto next = values.begin();
+  each_field(command, [&](const char*, auto& value) {
+    if (const auto bytes = *next++; !bytes.empty()) {
+      value = value_of<std::remove_cvref_t<decltype(value)>>(bytes);
+    }
+  });
+}
+
+std::optional<ReplayDifference> CommandReader::first_difference(std::span<const std::byte> recorded,
+                                                                const Command& replayed) const {
   Bytes again;
   Encoder<Bytes> out(again);
   write_command(out, replayed);
   if (std::equal(again.bytes.begin(), again.bytes.end(), recorded.begin(), recorded.end())) {
     return std::nullopt;
   }
-  std::map<std::string, Value> before;
-  Decoder in(recorded);
-  for (const FieldRecord& field : fields) {
-    before.emplace(field.name, read_value(in, field.kind));
-  }
+  const auto values = split(recorded);
+  auto next = values.begin();
   std::optional<ReplayDifference> found;
-  const auto differs = [&](std::string field, std::string was, std::string is) {
-    found = ReplayDifference{0, std::move(field), std::move(was), std::move(is)};
-  };
   each_field(replayed, [&](const char* name, const auto& value) {
     using T = std::remove_cvref_t<decltype(value)>;
-    const auto it = before.find(name);
-    if (found || it == before.end()) {
-      return;
-    }
-    if constexpr (kind_of<T>() == FieldKind::number) {
-      const auto* was = std::get_if<double>(&it->second);
-      if (was != nullptr && !same(*was, value)) {
-        differs(name, in_full(*was), in_full(value));
-      }
-    } else if constexpr (kind_of<T>() == FieldKind::whole) {
-      const auto* was = std::get_if<std::int32_t>(&it->second);
-      if (was != nullptr && *was != static_cast<std::int32_t>(value)) {
-        differs(name, in_words<T>(*was), in_words<T>(static_cast<std::int32_t>(value)));
-      }
-    } else if constexpr (kind_of<T>() == FieldKind::numbers) {
-      const auto* was = std::get_if<Eigen::VectorXd>(&it->second);
-      if (was != nullptr && was->size() != value.size()) {
-        differs(name, std::to_string(was->size()) + " entries", std::to_string(value.size()) + " entries");
-      }
-      for (Eigen::Index j = 0; was != nullptr && !found && j < value.size(); ++j) {
-        if (!same((*was)[j], value[j])) {
-          differs(name + ("[" + std::to_string(j) + "]"), in_full((*was)[j]), in_full(value[j]));
-        }
-      }
-    } else {
-      const auto* was = std::get_if<std::vector<Limit>>(&it->second);
-      if (was != nullptr && *was != value) {
-        const std::size_t j =
-            static_cast<std::size_t>(std::mismatch(was->begin(), was->end(), value.begin(), value.end()).first - was->begin());
-        const auto bits = [j](const std::vector<Limit>& limits) {
-          return j < limits.size() ? std::to_string(static_cast<unsigned>(limits[j])) : std::string("none");
-        };
-        differs(name + ("[" + std::to_string(j) + "]"), bits(*was), bits(value));
-      }
+    if (const auto bytes = *next++; !found && !bytes.empty()) {
+      found = difference(name, value_of<T>(bytes), value);
     }
   });
   return found;
@@ -240,15 +296,5 @@ std::string arm_bytes(const Arm& arm) {
 }
 
 Arm arm_of(const std::string& bytes) { return decode_arm(std::as_bytes(std::span<const char>(bytes))); }
-
-std::vector<std::byte> chunk(std::string_view tag, std::span<const std::byte> content) {
-  Bytes out;
-  Encoder<Bytes> encode(out);
-  out.write(tag.data(), tag.size());
-  encode(static_cast<std::uint64_t>(content.size()));
-  out.write(content.data(), content.size());
-  encode(crc32(out.bytes));
-  return std::move(out.bytes);
-}
 
 }  // namespace sidestep::recording

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -12,14 +15,19 @@
 #include "sidestep/math/instruction_set.hpp"
 #include "sidestep/planning/timed_path.hpp"
 
-// What the chunks of a recording hold, see recording.hpp. Each `describe` serves both directions.
+// What the records of a recording hold, see recording.hpp. Each `describe` serves both directions.
 namespace sidestep::recording {
 
-constexpr std::string_view magic{"\x89SSTEP\r\n", 8};  // not text; a transfer that changes line ends breaks it
-constexpr std::uint32_t format = 2;
-constexpr std::size_t tag_size = 4;
-constexpr std::string_view head_tag = "HEAD", request_tag = "REQU", obstacles_tag = "OBST", world_tag = "WRLD",
-                           arm_tag = "ARMS", step_tag = "STEP", done_tag = "DONE";
+constexpr std::uint32_t format = 4;            // in MCAP files
+constexpr std::uint32_t step_file_format = 2;  // in the files of Sidestep 0.2
+
+enum class RecordKind : std::uint8_t { head, arm, world, request, obstacles, step, done };
+constexpr std::size_t num_record_kinds = 7;
+/// Channel of each kind.
+constexpr std::array<std::string_view, num_record_kinds> record_topics{
+    "/sidestep/head",      "/sidestep/arm",  "/sidestep/world", "/sidestep/request",
+    "/sidestep/obstacles", "/sidestep/step", "/sidestep/done"};
+constexpr std::string_view record_encoding = "sidestep";
 
 template <class T, class Record>
 concept Of = std::is_same_v<std::remove_const_t<T>, Record>;
@@ -57,7 +65,7 @@ void describe(auto& archive, Of<RequestRecord> auto& r) {
           r.steer, r.q, r.times);
 }
 
-/// The points of one set of a source.
+/// The points of one set of a source, as files of 0.2 have them; in MCAP files see SetHistory.
 struct ObstaclesRecord {
   std::uint64_t number = 0;
   Eigen::Matrix3Xd points, velocities;
@@ -120,9 +128,13 @@ struct HeadRecord {
   std::string arm_file;
   std::vector<SettingRecord> settings;
   std::vector<FieldRecord> fields;
+  bool whole = true;  // from the first step on, with all that a replay needs; else of a black box
 };
 void describe(auto& archive, Of<HeadRecord> auto& h) {
   archive(h.version, h.sidestep_version, h.compiler, h.instruction_set, h.arm_number, h.arm_file, h.settings, h.fields);
+  if (h.version > step_file_format) {
+    archive(h.whole);
+  }
 }
 
 void describe(auto& archive, Of<TimedPath> auto& p) {
@@ -130,8 +142,38 @@ void describe(auto& archive, Of<TimedPath> auto& p) {
           p.limits.velocity, p.limits.acceleration, p.limits.jerk);
 }
 
-/// What of a step follows its inputs: one of these, then its content; `end` is the last.
-enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, answer, elapsed, look, restart, interval };
+/// The inputs that a step begins with. Then follows what it took over, see TakenKind, the command, and (not in 0.2) where that begins.
+struct StepInputs {
+  std::uint64_t number = 0;
+  double time = 0.0;  // that the step was told [s]; NaN: none
+  Eigen::VectorXd q, v;
+  bool dynamics = false;
+  Eigen::MatrixXd mass_matrix;
+  Eigen::VectorXd bias;
+  std::uint64_t arm = 0, request = 0, obstacles = 0;       // numbers of what the step used
+  std::uint64_t request_before = 0, obstacles_before = 0;  // and of what its arm was handed over with; 0: nothing
+};
+void read_step_inputs(Decoder& in, StepInputs& step);
+
+/// What follows a step's content: where in it the command begins.
+using CommandPlace = std::uint32_t;
+/// The command of a step's content, not in 0.2. Throws std::invalid_argument.
+std::span<const std::byte> command_of(std::span<const std::byte> step);
+
+/// What of a step follows its inputs: one of these, then its content; `end` is the last. First come `elapsed` and `interval`.
+enum class TakenKind : std::uint8_t {
+  end,
+  posture,
+  activations,
+  trajectory,
+  answer,
+  elapsed,
+  look,
+  restart,
+  interval,
+  pause,
+  told
+};
 
 /// Writes the fields of a command one after the other. No allocation.
 template <class Sink>
@@ -148,9 +190,26 @@ void write_command(Encoder<Sink>& out, const Command& command) noexcept {
 
 std::vector<FieldRecord> fields_of_commands();
 
-/// The first field that differs, where `recorded` holds fields of these names; empty where none does. NaN is like NaN.
-std::optional<ReplayDifference> first_difference(const std::vector<FieldRecord>& fields, std::span<const std::byte> recorded,
-                                                 const Command& replayed);
+/// Reads commands that were recorded with these fields; a field that is none of them, or of another kind, is left out.
+class CommandReader {
+ public:
+  explicit CommandReader(const std::vector<FieldRecord>& fields);
+  /// What is left out keeps its value. Throws std::invalid_argument.
+  void read(std::span<const std::byte> recorded, Command& command) const;
+  /// The first field that differs; empty where none does. NaN is like NaN. Throws std::invalid_argument.
+  std::optional<ReplayDifference> first_difference(std::span<const std::byte> recorded, const Command& replayed) const;
+
+ private:
+  struct Recorded {
+    FieldKind kind;
+    std::size_t field;  // Index among the fields of a command now; the number of these: none of them.
+  };
+  /// Each field of a command now as it was recorded; one that is left out is empty.
+  std::vector<std::span<const std::byte>> split(std::span<const std::byte> recorded) const;
+
+  std::size_t num_fields_ = 0;  // of a command now
+  std::vector<Recorded> recorded_;
+};
 
 std::vector<SettingRecord> to_records(const ControllerSettings& settings);
 /// Appends to `notes` what is not known, or not recorded.
@@ -161,8 +220,5 @@ const char* sidestep_version() noexcept;
 
 std::string arm_bytes(const Arm& arm);
 Arm arm_of(const std::string& bytes);
-
-/// A chunk as the file has it.
-std::vector<std::byte> chunk(std::string_view tag, std::span<const std::byte> content);
 
 }  // namespace sidestep::recording

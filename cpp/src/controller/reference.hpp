@@ -21,6 +21,13 @@ struct Reference {
   /// An acceleration or torque moved the arm on by q̇⁺ = q̇ + t q̈, q⁺ = q + t q̇ + t (t + T)/2 q̈ in the time t, where samples are T
   /// apart; a velocity by t q̇⁺; at a position that is commanded the arm stays.
   void hold(ControllerSettings::Output output, const Tick& tick) noexcept;
+  /// The next period begins where drives say that they go on from (nv each).
+  void continue_from(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity,
+                     const Eigen::VectorXd& acceleration) noexcept {
+    next_q = position;
+    next_v = velocity;
+    a = smooth_a = acceleration;
+  }
   /// The next period begins where this one ends.
   void go_on() noexcept {
     q = next_q;

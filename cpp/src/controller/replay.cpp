@@ -1,144 +1,19 @@
 // Gives a controller what a recording holds.
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
+#include <cstdio>
 #include <map>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include "impl.hpp"
-#include "recorder.hpp"
-#include "recording_content.hpp"
+#include "recorded_worlds.hpp"
+#include "recording_reader.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr std::uint64_t largest_chunk = std::uint64_t{1} << 32;  // Largest chunk: some 70 million obstacle points [B].
 constexpr std::uint64_t steps_between_checks = 256;  // Steps between two looks at whether the replay is interrupted.
-
-/// The chunks of a recording, one after the other.
-class ChunkReader {
- public:
-  explicit ChunkReader(const std::filesystem::path& path) : path_(path) {
-    errno = 0;
-    stream_.open(path, std::ios::binary);
-    std::error_code failed;
-    size_ = stream_ ? std::filesystem::file_size(path, failed) : 0;
-    if (!stream_ || failed) {
-      throw std::system_error(failed       ? failed.value()
-                              : errno != 0 ? errno
-                                           : EIO,
-                              std::generic_category(), "cannot read recording '" + path.string() + "'");
-    }
-    std::string begin(recording::magic.size(), '\0');
-    if (!stream_.read(begin.data(), static_cast<std::streamsize>(begin.size())) || begin != recording::magic) {
-      throw std::invalid_argument("recording '" + path.string() + "': it is not a recording of a controller's steps");
-    }
-    at_ = begin.size();
-  }
-
-  /// Whether there is a next whole chunk, which `tag` and `content` then are.
-  bool next() {
-    const std::uint64_t header = recording::tag_size + sizeof(std::uint64_t), check = sizeof(std::uint32_t);
-    begin_ = at_;
-    if (size_ - at_ < header + check) {
-      return false;
-    }
-    whole_.resize(static_cast<std::size_t>(header));
-    read(0);
-    recording::Decoder in(std::span<const std::byte>(whole_).subspan(recording::tag_size));
-    const auto length = in.take<std::uint64_t>();
-    if (length > largest_chunk || length > size_ - at_ - check) {
-      return false;
-    }
-    whole_.resize(static_cast<std::size_t>(header + length + check));
-    read(static_cast<std::size_t>(header));
-    const std::span<const std::byte> whole(whole_);
-    recording::Decoder end(whole.last(check));
-    if (end.take<std::uint32_t>() != recording::crc32(whole.first(whole.size() - check))) {
-      damaged_ = true;
-      return false;
-    }
-    tag = std::string_view(reinterpret_cast<const char*>(whole_.data()), recording::tag_size);
-    content = whole.subspan(static_cast<std::size_t>(header), static_cast<std::size_t>(length));
-    return true;
-  }
-
-  bool damaged() const noexcept { return damaged_; }
-  std::uint64_t begin() const noexcept { return begin_; }
-
-  std::string_view tag;
-  std::span<const std::byte> content;
-
- private:
-  void read(std::size_t from) {
-    const auto count = static_cast<std::streamsize>(whole_.size() - from);
-    if (!stream_.read(reinterpret_cast<char*>(whole_.data() + from), count)) {
-      throw std::system_error(EIO, std::generic_category(), "cannot read recording '" + path_.string() + "'");
-    }
-    at_ += static_cast<std::uint64_t>(count);
-  }
-
-  std::filesystem::path path_;
-  std::ifstream stream_;
-  std::uint64_t size_ = 0, at_ = 0, begin_ = 0;
-  bool damaged_ = false;
-  std::vector<std::byte> whole_;
-};
-
-template <class Record>
-Record read_record(std::span<const std::byte> content) {
-  recording::Decoder in(content);
-  Record record;
-  describe(in, record);
-  return record;
-}
-
-recording::HeadRecord read_head(ChunkReader& chunks, const std::filesystem::path& path) {
-  const std::string what = "recording '" + path.string() + "': ";
-  if (!chunks.next() || chunks.tag != recording::head_tag) {
-    throw std::invalid_argument(what + "its head is damaged or missing");
-  }
-  const auto version = recording::Decoder(chunks.content).take<std::uint32_t>();
-  if (version != recording::format) {
-    throw std::invalid_argument(what + "it has format version " + std::to_string(version) + ", this Sidestep reads version " +
-                                std::to_string(recording::format));
-  }
-  return read_record<recording::HeadRecord>(chunks.content);
-}
-
-RecordingHeader to_header(const recording::HeadRecord& head) {
-  RecordingHeader header{
-      head.version, head.sidestep_version, head.compiler, head.instruction_set, recording::arm_of(head.arm_file), {}, {}};
-  header.settings = recording::to_settings(head.settings, header.notes);
-  const std::vector<recording::FieldRecord> now = recording::fields_of_commands();
-  const auto missing = [](const std::vector<recording::FieldRecord>& in, const recording::FieldRecord& field) {
-    return std::none_of(in.begin(), in.end(),
-                        [&](const auto& other) { return other.name == field.name && other.kind == field.kind; });
-  };
-  for (const auto& field : head.fields) {
-    if (missing(now, field)) {
-      header.notes.push_back("field " + field.name + " of a command is recorded, and there is none now: not compared");
-    }
-  }
-  for (const auto& field : now) {
-    if (missing(head.fields, field)) {
-      header.notes.push_back("field " + field.name + " of a command is not in the recording: not compared");
-    }
-  }
-  if (head.compiler != __VERSION__) {
-    header.notes.push_back("compiler: recorded with " + head.compiler + ", now " + __VERSION__);
-  }
-  if (head.instruction_set != name(instruction_set())) {
-    header.notes.push_back("instruction set: recorded with " + head.instruction_set + ", now " + name(instruction_set()));
-  }
-  if (head.sidestep_version != recording::sidestep_version()) {
-    header.notes.push_back("Sidestep: recorded with " + head.sidestep_version + ", now " + recording::sidestep_version());
-  }
-  return header;
-}
 
 void note_differences(const ControllerSettings& recorded, const ControllerSettings& used, std::vector<std::string>& notes) {
   std::map<std::string, double> before;
@@ -159,48 +34,37 @@ void note_differences(const ControllerSettings& recorded, const ControllerSettin
   }
 }
 
-Obstacles obstacles_of(const recording::ObstaclesRecord& record) {
-  if (record.points.cols() == 0) {
-    return Obstacles::none();
-  }
-  Obstacles made = Obstacles::in_order(record.points, record.radii, record.velocities, record.uncertainty,
-                                       {record.order.begin(), record.order.end()});
-  return record.names.size() == 1 && record.names.front().empty()
-             ? made
-             : made.named(record.names, {record.counts.begin(), record.counts.end()});
-}
-
 }  // namespace
 
 /// A controller without threads that takes the steps of a recording.
 class Replay {
  public:
   Replay(const recording::HeadRecord& head, Arm arm, ControllerSettings settings)
-      : fields_(head.fields), controller_(std::move(arm), std::move(settings), false) {
+      : commands_(head.fields),
+        has_command_place_(head.version > recording::step_file_format),
+        controller_(std::move(arm), std::move(settings), false) {
     controller_.impl_->arm_number = head.arm_number;
+    worlds_.begin_file(head.version);
   }
 
-  void keep(std::string_view tag, std::span<const std::byte> content) {
-    if (tag == recording::request_tag) {
-      auto record = read_record<recording::RequestRecord>(content);
+  /// Keeps a record that is no step until a step takes it.
+  void keep(recording::RecordKind kind, std::span<const std::byte> content) {
+    if (kind == recording::RecordKind::request) {
+      auto record = recording::read_record<recording::RequestRecord>(content);
       const std::uint64_t number = record.number;
       requests_.insert_or_assign(number, std::move(record));
-    } else if (tag == recording::obstacles_tag) {
-      auto record = read_record<recording::ObstaclesRecord>(content);
-      const std::uint64_t number = record.number;
-      obstacles_.insert_or_assign(number, std::make_shared<const Obstacles>(obstacles_of(record)));
-    } else if (tag == recording::world_tag) {
-      auto record = read_record<recording::WorldRecord>(content);
-      const std::uint64_t number = record.number;
-      worlds_.insert_or_assign(number, std::move(record));
-    } else if (tag == recording::arm_tag) {
-      auto record = read_record<recording::ArmRecord>(content);
+    } else if (kind == recording::RecordKind::obstacles) {
+      worlds_.keep_set(content);
+    } else if (kind == recording::RecordKind::world) {
+      worlds_.keep_world(content);
+    } else if (kind == recording::RecordKind::arm) {
+      auto record = recording::read_record<recording::ArmRecord>(content);
       const std::uint64_t number = record.number;
       arms_.insert_or_assign(number, std::move(record));
     }
   }
 
-  /// Makes the step that a chunk holds; the first field that differs. Throws std::invalid_argument where it holds none.
+  /// Makes the step that a record holds; the first field that differs. Throws std::invalid_argument where it holds none.
   std::optional<ReplayDifference> step(std::span<const std::byte> content);
 
   std::uint64_t num_steps() const noexcept { return step_; }
@@ -214,53 +78,46 @@ class Replay {
   void give_taken(recording::Decoder& in);
   Request request_of(const recording::RequestRecord& record, const Impl& impl) const;
 
-  std::vector<recording::FieldRecord> fields_;
+  const recording::CommandReader commands_;
+  const bool has_command_place_;
   Controller controller_;
   std::map<std::uint64_t, recording::RequestRecord> requests_;
-  std::map<std::uint64_t, std::shared_ptr<const Obstacles>> obstacles_;
-  std::map<std::uint64_t, recording::WorldRecord> worlds_;
+  RecordedWorlds worlds_;
   std::map<std::uint64_t, recording::ArmRecord> arms_;
   std::uint64_t step_ = 0, request_ = 0, world_ = 0;
 };
 
 std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content) {
   recording::Decoder in(content);
-  std::uint64_t number = 0, arm = 0, request = 0, obstacles = 0, request_before = 0, obstacles_before = 0;
-  double time = 0.0;  // that the step is told; NaN: none
-  Eigen::VectorXd q, v, bias;
-  Eigen::MatrixXd mass_matrix;
-  bool dynamics = false;
-  in(number, time, q, v, dynamics);
-  if (dynamics) {
-    in(mass_matrix, bias);
-  }
-  in(arm, request, obstacles, request_before, obstacles_before);
-  if (number != step_ + 1) {
-    throw std::invalid_argument("step " + std::to_string(number) + " follows step " + std::to_string(step_));
+  recording::StepInputs s;
+  recording::read_step_inputs(in, s);
+  if (s.number != step_ + 1) {
+    throw std::invalid_argument("step " + std::to_string(s.number) + " follows step " + std::to_string(step_));
   }
   // In the order in which a step takes over: an arm with what was set before, then what was set since, then results of workers.
-  give_request(request_before);
-  give_world(obstacles_before);
+  give_request(s.request_before);
+  give_world(s.obstacles_before);
   const Impl& now = *controller_.impl_;
   const Impl* const lifted = now.lifted.load();
-  if (arm != now.arm_number && (lifted == nullptr || arm != lifted->arm_number)) {
-    give_arm(arm);
+  if (s.arm != now.arm_number && (lifted == nullptr || s.arm != lifted->arm_number)) {
+    give_arm(s.arm);
   }
   controller_.take_over();
-  give_request(request);
-  give_world(obstacles);
+  give_request(s.request);
+  give_world(s.obstacles);
   give_taken(in);
   Impl& impl = *controller_.impl_;
-  step_ = number;
-  const Eigen::Ref<const Eigen::MatrixXd> M(mass_matrix);
-  const Eigen::Ref<const Eigen::VectorXd> h(bias);
-  const Command& command = impl.step(q, v, dynamics ? ToldDynamics{&M, &h} : ToldDynamics{}, time);
-  std::optional<ReplayDifference> difference = recording::first_difference(fields_, in.rest(), command);
-  if (impl.arm_number != arm) {
-    difference = ReplayDifference{0, "arm", "number " + std::to_string(arm), "number " + std::to_string(impl.arm_number)};
+  step_ = s.number;
+  const Eigen::Ref<const Eigen::MatrixXd> M(s.mass_matrix);
+  const Eigen::Ref<const Eigen::VectorXd> h(s.bias);
+  const Command& command = impl.step(s.q, s.v, s.dynamics ? ToldDynamics{&M, &h} : ToldDynamics{}, s.time);
+  const std::span<const std::byte> recorded = has_command_place_ ? recording::command_of(content) : in.rest();
+  std::optional<ReplayDifference> difference = commands_.first_difference(recorded, command);
+  if (impl.arm_number != s.arm) {
+    difference = ReplayDifference{0, "arm", "number " + std::to_string(s.arm), "number " + std::to_string(impl.arm_number)};
   }
   if (difference) {
-    difference->step = number;
+    difference->step = s.number;
   }
   return difference;
 }
@@ -285,28 +142,9 @@ void Replay::give_world(std::uint64_t number) {
   if (number == 0 || number == world_) {
     return;
   }
-  const auto found = worlds_.find(number);
-  if (found == worlds_.end()) {
-    throw std::invalid_argument("its obstacles " + std::to_string(number) + " are missing");
-  }
   world_ = number;
-  World world;
-  world.number = number;
-  std::uint64_t oldest = number;
-  for (const recording::SourceRecord& record : found->second.sources) {
-    const auto points = obstacles_.find(record.number);
-    if (points == obstacles_.end()) {
-      throw std::invalid_argument("set " + std::to_string(record.number) + " of its source '" + record.name + "' is missing");
-    }
-    world.sources.push_back({record.name, record.id, record.number, record.time, record.heard, record.heard_number,
-                             record.valid_for, record.moves_for, record.emptied, record.repeated, points->second});
-    oldest = std::min(oldest, record.number);
-  }
-  world.obstacles = join(world.sources);
-  const auto given = std::make_shared<const World>(std::move(world));
+  const auto given = std::make_shared<const World>(worlds_.take(number));
   controller_.tell([&](Impl& impl) { impl.put(given); });
-  worlds_.erase(worlds_.begin(), found);
-  obstacles_.erase(obstacles_.begin(), obstacles_.lower_bound(oldest));
 }
 
 void Replay::give_arm(std::uint64_t number) {
@@ -355,6 +193,18 @@ void Replay::give_taken(recording::Decoder& in) {
         break;
       }
       case TakenKind::restart: impl.restart(); break;
+      case TakenKind::told: {
+        Eigen::VectorXd q, v, a;
+        in(q, v, a);
+        impl.continue_from(q, v, a);
+        break;
+      }
+      case TakenKind::pause: {
+        const bool paused = in.take<bool>();
+        controller_.paused_ = paused;  // for the steps after this one
+        impl.pause(paused);
+        break;
+      }
       case TakenKind::elapsed: machine.since_end = in.take<double>(); break;
       case TakenKind::interval: in(machine.since_begin, machine.now); break;
       case TakenKind::look: {
@@ -371,7 +221,7 @@ void Replay::give_taken(recording::Decoder& in) {
         in(answer.goal_number, answer.route_number, answer.path_number, answer.status, answer.progress, has_route);
         if (has_route) {
           TimedPath route;
-          describe(in, route);
+          recording::describe(in, route);
           answer.route = std::make_shared<const TimedPath>(std::move(route));
         }
         if (OnlinePlanner* const planner = impl.planner()) {
@@ -424,15 +274,19 @@ Request Replay::request_of(const recording::RequestRecord& record, const Impl& i
 }
 
 RecordingHeader read_recording_header(const std::filesystem::path& path) {
-  ChunkReader chunks(path);
-  return to_header(read_head(chunks, path));
+  return recording::to_header(recording::RecordingReader(path).head);
 }
 
 ReplayResult replay(const std::filesystem::path& path, const std::optional<Arm>& arm,
                     const std::optional<ControllerSettings>& settings, const Interrupted& interrupted) {
-  ChunkReader chunks(path);
-  const recording::HeadRecord head = read_head(chunks, path);
-  RecordingHeader header = to_header(head);
+  recording::RecordingReader records(path);
+  RecordingHeader header = recording::to_header(records.head);
+  if (!header.whole) {
+    throw std::invalid_argument(
+        "recording '" + path.string() +
+        "': it is of a black box, which begins in the middle of a motion, so that it cannot be replayed; "
+        "read it with `sidestep report` or load_recording");
+  }
   ReplayResult result;
   result.notes = std::move(header.notes);
   result.arm = header.arm.name();
@@ -443,16 +297,16 @@ ReplayResult replay(const std::filesystem::path& path, const std::optional<Arm>&
     result.notes.push_back("arm: recorded '" + header.arm.name() + "' with hash " + header.arm.content_hash().substr(0, 12) +
                            ", replayed with '" + arm->name() + "', " + arm->content_hash().substr(0, 12));
   }
-  Replay run(head, arm ? *arm : header.arm, settings ? *settings : header.settings);
+  Replay run(records.head, arm ? *arm : header.arm, settings ? *settings : header.settings);
   try {
-    while (!result.difference && chunks.next()) {
-      if (chunks.tag == recording::step_tag) {
+    while (!result.difference && records.next()) {
+      if (records.kind == recording::RecordKind::step) {
         if (run.num_steps() % steps_between_checks == 0 && interrupted()) {
           throw Interruption();
         }
-        result.difference = run.step(chunks.content);
-      } else if (chunks.tag == recording::done_tag) {
-        recording::Decoder in(chunks.content);
+        result.difference = run.step(records.content);
+      } else if (records.kind == recording::RecordKind::done) {
+        recording::Decoder in(records.content);
         const auto steps = in.take<std::uint64_t>();
         result.lost = in.take<std::uint64_t>();
         result.complete = true;
@@ -461,12 +315,11 @@ ReplayResult replay(const std::filesystem::path& path, const std::optional<Arm>&
               "it says that it holds " + std::to_string(steps) + " steps, there are " + std::to_string(run.num_steps());
         }
       } else {
-        run.keep(chunks.tag, chunks.content);
+        run.keep(records.kind, records.content);
       }
     }
-    if (chunks.damaged()) {
-      result.damage = "the bytes from " + std::to_string(chunks.begin()) + " on, after step " +
-                      std::to_string(run.num_steps()) + ", are not those that were written";
+    if (const std::string where = records.damage(); !where.empty()) {
+      result.damage = where + ", after step " + std::to_string(run.num_steps()) + ", are not those that were written";
     }
   } catch (const std::invalid_argument& error) {
     result.damage = "after step " + std::to_string(run.num_steps()) + ": " + error.what();

@@ -163,7 +163,7 @@ void Controller::Impl::report_status(const Goal& followed, bool apart, const Tic
   const ActivityJudge::Verdict verdict = activity_.judge(
       {inputs_.request(), inputs_.destination(), inputs_.goal(), &followed, measured_, arm_state(apart), state_.attraction,
        tick, must_rest(), inputs_.is_fresh(), inputs_.is_under_way(), inputs_.input().waits(), state_.findings.blocked});
-  command_.activity = touch_.is_touched() && !stale ? Activity::waiting : verdict.activity;
+  command_.activity = must_rest() && !stale ? Activity::waiting : verdict.activity;
   state_.findings.rests = verdict.rests.value_or(state_.findings.rests);
   if (look_ahead_.slows(command_.activity == Activity::moving)) {
     status = std::max(status, SafetyStatus::limited);

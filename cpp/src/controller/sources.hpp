@@ -34,6 +34,8 @@ class Sources {
   void go_on_from(Sources& before) noexcept;
 
   const Obstacles& obstacles() const noexcept { return buffer_.current().obstacles; }
+  /// The sources of these obstacles: source k is part k of them.
+  const std::vector<SourceSet>& sources() const noexcept { return buffer_.current().sources; }
   /// Number of the obstacles in use, 0: none were set; and of those that were handed over.
   std::uint64_t number() const noexcept { return number_; }
   std::uint64_t handed_over() const noexcept { return buffer_.current().number; }

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "tick.hpp"
 #include "sidestep/clearance/clearance_query.hpp"
 #include "sidestep/constraints/speed_constraint.hpp"
 #include "sidestep/controller/command.hpp"

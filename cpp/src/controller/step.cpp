@@ -17,10 +17,15 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const bool known = measured_.take(q, v);
   take_over(tick);
   if (!known || !tick.goes_on()) {
+    state_.told.is = false;
     return stop(q, v, told, tick);
   }
   // Measurement = observe(q, v, Tick)
   reference_.hold(settings.output, tick);
+  if (state_.told.is) {
+    reference_.continue_from(state_.told.position, state_.told.velocity, state_.told.acceleration);
+    tracker_.begin_anew();
+  }
   measured_.judge(reference_.next_q, last_.acceleration, tick);
   board_.show_measured(measured_.position());
   judge_touch(tick);
@@ -64,6 +69,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
     tell_worker(followed, time, inputs_.goal().take_question());
   }
   last_.take(command_.acceleration, command_.torque, model.torque);
+  state_.told.is = false;
   measured_.end_step();
   clock_.end_step();
   return command_;
@@ -279,7 +285,8 @@ ProgramStatus Controller::Impl::guard(ProgramStatus solved, const Tick& tick) no
     return solved;
   }
   const StopTorque torque{dynamics_.mass(), dynamics_.bias(), program_.jerk_share(tick)};
-  const GuardedMotion now{reference_.q, reference_.v, reference_.smooth_a, tick.period, tick.is_as_expected()};
+  const GuardedMotion now{reference_.q, reference_.v, reference_.smooth_a, tick.period,
+                          tick.is_as_expected() && !state_.told.is};
   if (!guard_.keep(now, sources_.obstacles(), model.torque ? &torque : nullptr, solution_.acceleration)) {
     return solved;
   }

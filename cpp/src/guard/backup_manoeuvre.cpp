@@ -14,7 +14,7 @@ constexpr double below_now = 0.0002;      // Distance by which a clearance below
 constexpr double least_spacing = 0.0002;  // Least motion between two checks [m], where the floor is lower.
 constexpr int first_strides = 16;         // Number of strides into which the check first divides a stop.
 constexpr double limit_rounding = 1e-6;   // Relative excess of a limit that counts as rounding.
-constexpr int slower_stops = 3;           // Number of stops tried, each with half the acceleration of the one before.
+constexpr int slower_stops = 6;           // Number of stops tried, each with half the acceleration of the one before.
 constexpr int pause = 16;                 // Periods without a search after one with torque found no stop: it takes long.
 
 }  // namespace

@@ -106,6 +106,7 @@ void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const ArmI
     }
   }
   residual_.depth_error = residual_.on_arm > 0 ? depth_errors_ / residual_.on_arm : 0.0;
+  image.mark_edges_of_arm(camera);
 }
 
 void ArmMask::mark(const Seen& seen, const DepthCamera& camera, const CameraRays& rays, DepthImage& image) noexcept {

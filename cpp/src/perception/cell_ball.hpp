@@ -17,4 +17,8 @@ struct CellBall {
 CellBall ball_behind(const Eigen::Vector3d& middle, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                      const Eigen::Vector3d& eye, double depth);
 
+/// The smallest ball with centre and radius in single precision that holds a ball, around its centre rounded: recordings keep half as
+/// many bytes of it.
+CellBall in_single_precision(const CellBall& ball);
+
 }  // namespace sidestep

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +16,7 @@ namespace {
 constexpr float slope_share = 0.03f;   // Difference of neighbouring depths on a slanted surface, as a share of the depth.
 constexpr float noise_reach = 4.0f;    // The same by noise, in standard deviations.
 constexpr float least_support = 1.5f;  // Neighbours on the same surface, below which a pixel is flying: two count.
+constexpr int edge_reach = 2;          // Pixels from the arm within which one may mix its depth with another.
 
 void check_size(const DepthCamera& camera, std::size_t size) {
   const auto expected = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
@@ -48,6 +51,8 @@ DepthImage::DepthImage(const DepthCamera& camera)
       tolerance_(static_cast<std::size_t>(camera.width)),
       support_(tolerance_.size()),
       others_(tolerance_.size()),
+      arm_in_column_(tolerance_.size() + 2 * static_cast<std::size_t>(edge_reach)),
+      beside_arm_(tolerance_.size()),
       labels_(depth_.size()) {}
 
 void DepthImage::take(const DepthCamera& camera, const RawDepth& raw) {
@@ -110,6 +115,76 @@ void DepthImage::mark_edges(const DepthCamera& camera) noexcept {
                  : z[u] > far   ? PixelLabel::outside
                  : flies        ? PixelLabel::edge
                                 : PixelLabel::obstacle;
+    }
+  }
+}
+
+bool DepthImage::find_beside_arm(int row) noexcept {
+  std::fill(arm_in_column_.begin(), arm_in_column_.end(), static_cast<unsigned char>(0));
+  const auto width = static_cast<std::size_t>(width_);
+  bool is_near = false;
+  for (int v = std::max(0, row - edge_reach); v <= std::min(height_ - 1, row + edge_reach); ++v) {
+    const PixelLabel* const label = labels_.data() + static_cast<std::ptrdiff_t>(v) * width_;
+    if (std::memchr(label, static_cast<int>(PixelLabel::arm), width) == nullptr) {
+      continue;
+    }
+    is_near = true;
+    unsigned char* const __restrict found = arm_in_column_.data() + edge_reach;
+    for (std::size_t u = 0; u < width; ++u) {
+      found[u] = label[u] == PixelLabel::arm ? static_cast<unsigned char>(1) : found[u];
+    }
+  }
+  if (is_near) {
+    const PixelLabel* const label = labels_.data() + static_cast<std::ptrdiff_t>(row) * width_;
+    const unsigned char* const arm = arm_in_column_.data();
+    unsigned char* const __restrict found = beside_arm_.data();
+    static_assert(edge_reach == 2);
+    for (std::size_t u = 0; u < width; ++u) {
+      const auto beside = static_cast<unsigned char>(arm[u] | arm[u + 1] | arm[u + 2] | arm[u + 3] | arm[u + 4]);
+      found[u] = label[u] == PixelLabel::obstacle ? beside : static_cast<unsigned char>(0);
+    }
+  }
+  return is_near;
+}
+
+bool DepthImage::is_between(int u, int v, float noise, float slope) const noexcept {
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  const float own = depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u)];
+  float arm_low = inf, arm_high = 0.0f, low = inf, high = 0.0f;
+  for (int row = std::max(0, v - edge_reach); row <= std::min(height_ - 1, v + edge_reach); ++row) {
+    for (int column = std::max(0, u - edge_reach); column <= std::min(width_ - 1, u + edge_reach); ++column) {
+      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column);
+      const float z = depth_[i];
+      if (!(z > 0.0f)) {
+        continue;
+      }
+      const bool is_arm = labels_[i] == PixelLabel::arm;
+      (is_arm ? arm_low : low) = std::min(is_arm ? arm_low : low, z);
+      (is_arm ? arm_high : high) = std::max(is_arm ? arm_high : high, z);
+    }
+  }
+  const bool is_behind_arm = own > arm_low + noise, is_before_arm = own < arm_high - noise;
+  return (is_behind_arm && (is_before_arm || own < high - noise - slope)) || (is_before_arm && own > low + noise + slope);
+}
+
+void DepthImage::mark_edges_of_arm(const DepthCamera& camera) noexcept {
+  const auto constant = noise_reach * static_cast<float>(camera.noise.constant);
+  const auto quadratic = noise_reach * static_cast<float>(camera.noise.quadratic);
+  for (int v = 0; v < height_; ++v) {
+    if (!find_beside_arm(v)) {
+      continue;
+    }
+    const unsigned char *const begin = beside_arm_.data(), *const end = begin + width_;
+    const auto next = [end](const unsigned char* from) noexcept {
+      return static_cast<const unsigned char*>(std::memchr(from, 1, static_cast<std::size_t>(end - from)));
+    };
+    for (const unsigned char* at = next(begin); at != nullptr; at = next(at + 1)) {
+      const int u = static_cast<int>(at - begin);
+      const std::size_t i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u);
+      const float z = depth_[i];
+      if (is_between(u, v, constant + quadratic * z * z, slope_share * z)) {
+        labels_[i] = PixelLabel::edge;
+      }
     }
   }
 }

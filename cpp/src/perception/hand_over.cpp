@@ -95,7 +95,7 @@ CellBall Perception::Impl::ball_of(const Voxel& voxel, bool moved) const {
   CellBall ball = ball_behind(moved ? voxel.frame_middle() : voxel.middle(), voxel.low_corner(), voxel.high_corner(),
                               views[voxel.camera].X_WC.translation(), pushed_back * map.edge(voxel));
   ball.radius += static_cast<double>(voxel.error);
-  return ball;
+  return in_single_precision(ball);
 }
 
 Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) const {
@@ -224,11 +224,11 @@ std::vector<Perception::Cell> Perception::Impl::cells() const {
 
 std::vector<PixelLabel> Perception::Impl::labels(const View& view) const {
   std::vector<PixelLabel> labels(view.image.labels(), view.image.labels() + view.image.size());
-  const Eigen::Matrix3f R = view.X_WC.linear().cast<float>();
-  const Eigen::Vector3f t = view.X_WC.translation().cast<float>();
+  const Eigen::Matrix3f R = view.shown_X_WC.linear().cast<float>();
+  const Eigen::Vector3f t = view.shown_X_WC.translation().cast<float>();
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] == PixelLabel::obstacle) {
-      const float z = view.image.depth()[i];
+      const float z = view.depth[i];
       const Eigen::Vector3f p = R * Eigen::Vector3f(view.rays.x()[i] * z, view.rays.y()[i] * z, z) + t;
       const int voxel = map.voxel_of(p.data());
       if (voxel >= 0 && static_cast<std::size_t>(voxel) < tested.size() && is_excluded[static_cast<std::size_t>(voxel)] != 0) {

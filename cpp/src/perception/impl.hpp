@@ -10,6 +10,7 @@
 #include "cell_ball.hpp"
 #include "reach.hpp"
 #include "sidestep/perception/perception.hpp"
+#include "sidestep/perception/steady_depth.hpp"
 #include "sidestep/perception/unseen_space.hpp"
 #include "sidestep/scene/velocity_estimate.hpp"
 
@@ -20,16 +21,19 @@ inline constexpr std::size_t most_cameras = 16;
 struct Perception::Impl {
   /// A camera with its last image.
   struct View {
-    View(const DepthCamera& its, const Arm& arm);
+    View(const DepthCamera& its, const Arm& arm, int steady_images);
 
     DepthCamera camera;
     CameraRays rays;
     DepthImage image;
+    SteadyDepth steady;
     ArmMask mask;
-    int frame_of_arm;  // Frame on which the camera is; -1: the world.
-    Eigen::Isometry3d X_WC;
-    double time = std::numeric_limits<double>::quiet_NaN();    // of the last image [s]
-    double begin = std::numeric_limits<double>::quiet_NaN();   // of its first image [s]
+    int frame_of_arm;                                         // Frame on which the camera is; -1: the world.
+    const float* depth;                                       // of the last image that was used, with less noise where it rests
+    Eigen::Isometry3d X_WC;                                   // at the last image that was used
+    Eigen::Isometry3d shown_X_WC;                             // at the image that is held, used or not
+    double time = std::numeric_limits<double>::quiet_NaN();   // of the last image that was used [s]
+    double begin = std::numeric_limits<double>::quiet_NaN();  // of its first image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows

@@ -20,6 +20,10 @@ constexpr double sees_nothing_of_arm = 0.9;     // The same, of one image, above
 constexpr int least_rays = 60;                  // Rays through the arm from which on it can be told.
 constexpr double future = 0.5;  // Time by which an image may be newer than the last step before that is worth a word [s].
 
+constexpr const char* sees_nothing = "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
+constexpr const char* sees_through_arm =
+    "': its image sees through the arm and is not used; check the unit of depth, the camera's pose and the times of its images";
+
 using Clock = std::chrono::steady_clock;
 double since(Clock::time_point& mark) noexcept {
   const Clock::time_point now = Clock::now();
@@ -29,6 +33,12 @@ double since(Clock::time_point& mark) noexcept {
 /// Whether an image shows nothing of an arm that it should show: one of another unit, place or time, which says nothing of what is free.
 bool sees_through(const ArmResidual& arm) noexcept {
   return arm.rays >= least_rays && arm.through_share() > sees_nothing_of_arm;
+}
+
+void count_pixels(const DepthImage& image, PerceptionReport& report) noexcept {
+  report.obstacle_pixels = image.count(PixelLabel::obstacle);
+  report.arm_pixels = image.count(PixelLabel::arm);
+  report.edge_pixels = image.count(PixelLabel::edge);
 }
 
 }  // namespace
@@ -56,6 +66,8 @@ Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras,
   impl_ = std::make_unique<Impl>(controller, cameras_, settings_);
 }
 Perception::~Perception() = default;
+
+const DepthCamera& Perception::camera(const std::string& name) const { return cameras_[impl_->index(name)]; }
 
 PerceptionReport Perception::update(const std::string& camera, const RawDepth& depth, const Capture& capture) {
   const std::lock_guard lock(impl_->mutex);
@@ -85,25 +97,30 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   Clock::time_point mark = Clock::now();
   take(view.camera, view.image);
   report.depth_time = since(mark);
-  if (view.image.count(PixelLabel::nothing) > (1.0 - least_valid_share) * static_cast<double>(view.image.size())) {
-    report.question =
-        "camera '" + view.camera.name + "' sees nothing: fewer than 1 % of its pixels have a depth; the image is not used";
-    return report;
-  }
+  // An image that is not used is still masked: its labels are shown, and must not call the arm an obstacle.
+  const bool is_blind =
+      view.image.count(PixelLabel::nothing) > (1.0 - least_valid_share) * static_cast<double>(view.image.size());
   const auto placed = [&](const KinematicState& state) {
     return ArmInView{state, capture.pose.value_or(pose_of(view, state))};
   };
-  const Eigen::Isometry3d X_WC = placed(now).X_WC;
+  const Eigen::Isometry3d X_WC = view.shown_X_WC = placed(now).X_WC;
   view.mask.mark(view.camera, view.rays, placed(before), placed(now), placed(after), view.image);
   report.mask_time = since(mark);
-  if (sees_through(view.mask.residual())) {
-    report.arm = view.mask.residual();
-    report.question =
-        "camera '" + view.camera.name +
-        "': its image sees through the arm and is not used; check the unit of depth, the camera's pose and the times of its images";
+  report.arm = view.mask.residual();
+  count_pixels(view.image, report);
+  if (is_blind || sees_through(report.arm)) {
+    report.question = "camera '" + view.camera.name + (is_blind ? sees_nothing : sees_through_arm);
     return report;
   }
-  const SeenImage seen{view.camera, view.rays, X_WC, view.image, view.mask.front(), static_cast<std::uint8_t>(number), time};
+  const bool stands_still = view.camera.link.empty() && !capture.pose;
+  if (stands_still && settings.steady_images > 1) {
+    view.steady.add(view.camera, view.image);
+    view.depth = view.steady.depth();
+  } else {
+    view.depth = view.image.depth();
+  }
+  const SeenImage seen{
+      view.camera, view.rays, X_WC, view.image, view.depth, view.mask.front(), static_cast<std::uint8_t>(number), time};
   map.add(seen);
   report.map_time = since(mark);
   if (unseen) {
@@ -160,7 +177,6 @@ bool Perception::Impl::find_arm(const View& view, double time, const Eigen::Vect
 }
 
 void Perception::Impl::judge(View& view, PerceptionReport& report) const {
-  report.arm = view.mask.residual();
   if (report.arm.rays >= least_rays) {
     const double share =
         std::isnan(view.judged) ? 1.0 : 1.0 - std::exp(-std::max(0.0, view.time - view.judged) / smoothing_time);
@@ -174,9 +190,6 @@ void Perception::Impl::judge(View& view, PerceptionReport& report) const {
         std::to_string(static_cast<int>(std::lround(100.0 * view.through))) +
         " % of the rays that should meet it pass; check the camera's pose and the times of its images (sidestep camera check)";
   }
-  report.obstacle_pixels = view.image.count(PixelLabel::obstacle);
-  report.arm_pixels = view.image.count(PixelLabel::arm);
-  report.edge_pixels = view.image.count(PixelLabel::edge);
 }
 
 void Perception::leave_out(const std::string& name, const Obstacles& region, double grow, const std::string& link) {
@@ -213,12 +226,13 @@ void Perception::forget() {
   for (auto& view : impl_->views) {
     view.begin = std::numeric_limits<double>::quiet_NaN();
     view.motion.forget();
+    view.steady.forget();
   }
 }
 
 Eigen::Isometry3d Perception::pose(const std::string& camera) const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->views[impl_->index(camera)].X_WC;
+  return impl_->views[impl_->index(camera)].shown_X_WC;
 }
 std::vector<float> Perception::depth(const std::string& camera) const {
   const std::lock_guard lock(impl_->mutex);

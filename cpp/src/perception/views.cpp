@@ -5,13 +5,16 @@
 #include "impl.hpp"
 
 namespace sidestep {
-Perception::Impl::View::View(const DepthCamera& its, const Arm& arm)
+Perception::Impl::View::View(const DepthCamera& its, const Arm& arm, int steady_images)
     : camera(its),
       rays(its),
       image(its),
+      steady(its, steady_images),
       mask(arm.robot(), arm.body()),
       frame_of_arm(its.link.empty() ? -1 : arm.robot().frame_index(its.link)),
-      X_WC(its.pose) {}
+      depth(image.depth()),
+      X_WC(its.pose),
+      shown_X_WC(its.pose) {}
 
 Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras, const PerceptionSettings& chosen)
     : controller(its),
@@ -25,7 +28,7 @@ Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras,
       map(reach.centre, reach.radius, chosen) {
   views.reserve(cameras.size());
   for (const DepthCamera& camera : cameras) {
-    views.emplace_back(camera, *arm);
+    views.emplace_back(camera, *arm, settings.steady_images);
   }
   if (!settings.unseen_is_free) {
     unseen.emplace(reach.centre, reach.radius, settings);

@@ -13,10 +13,11 @@ namespace {
 constexpr double rests_after = 0.1;  // Time for which something must be seen before it is known to rest [s].
 constexpr double kept_per_seen =
     10.0;  // Time for which something is kept that moved when it was seen, in times for which it was seen.
-constexpr double kept_at_least = 0.3;     // The same, at least [s].
-constexpr float shrinks_by = 0.2f;        // Share of its excess by which a box shrinks from one image to the next.
-constexpr double second_within = 0.5;     // Time within which a second image must show a voxel with few pixels [s].
-constexpr double noise_beyond = 3.0;      // Noise of a depth that is behind a cell, in standard deviations.
+constexpr double kept_at_least = 0.3;       // The same, at least [s].
+constexpr float shrinks_by = 0.2f;          // Share of its excess by which a box shrinks from one image to the next.
+constexpr float settled_shrinks_by = 0.5f;  // The same of one that has been seen for long.
+constexpr double second_within = 0.5;       // Time within which a second image must show a voxel with few pixels [s].
+constexpr double noise_beyond = 3.0;        // Noise of a depth that is behind a cell, in standard deviations.
 constexpr int missed_at_most = 5;         // Images that see the surface nearby, and not in the cell, after which it was noise.
 constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
 constexpr double settled_noise = 2.0;     // Noise of depths that explains a cell by one nearby, in standard deviations.
@@ -98,7 +99,7 @@ void VoxelMap::add_points(const SeenImage& seen) {
   const int width = seen.image.width();
   for (int v = 0; v < seen.image.height(); ++v) {
     const auto row = static_cast<std::ptrdiff_t>(v) * width;
-    kernel.place(X_WC, seen.rays.x() + row, seen.rays.y() + row, seen.image.depth() + row, width, row_x_.data(), row_y_.data(),
+    kernel.place(X_WC, seen.rays.x() + row, seen.rays.y() + row, seen.depth + row, width, row_x_.data(), row_y_.data(),
                  row_z_.data());
     grid_.cells(row_x_.data(), row_y_.data(), row_z_.data(), width, row_cells_.data());
     add_row(seen, seen.image.labels() + row);
@@ -142,15 +143,15 @@ void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
 
 void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   const bool shown_again = voxel.first < seen.time && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
+  const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
       voxel.low[axis] = voxel.frame_low[axis];
       voxel.high[axis] = voxel.frame_high[axis];
     } else {
-      voxel.low[axis] =
-          std::min(voxel.frame_low[axis], voxel.low[axis] + shrinks_by * (voxel.frame_low[axis] - voxel.low[axis]));
+      voxel.low[axis] = std::min(voxel.frame_low[axis], voxel.low[axis] + shrinks * (voxel.frame_low[axis] - voxel.low[axis]));
       voxel.high[axis] =
-          std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks_by * (voxel.frame_high[axis] - voxel.high[axis]));
+          std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks * (voxel.frame_high[axis] - voxel.high[axis]));
     }
   }
   const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();

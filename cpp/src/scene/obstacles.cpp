@@ -115,11 +115,14 @@ Obstacles Obstacles::moving(Eigen::Matrix3Xd velocities, Eigen::VectorXd uncerta
                                 " points; there must be one of each, finite, no uncertainty below 0");
   }
   Obstacles copy = *this;
-  if (velocities != velocities_ || uncertainty != uncertainty_) {
+  if (velocities != velocities_) {
     copy.velocities_ = std::move(velocities);
-    copy.uncertainty_ = std::move(uncertainty);
-    copy.tree_ = PointTree(copy.points_, copy.radii_, copy.velocities_, tree_.order());
+    copy.tree_ = tree_.moving(copy.points_, copy.radii_, copy.velocities_);
     copy.find_movers();
+    copy.version_ = next_version();
+  }
+  if (uncertainty != uncertainty_) {
+    copy.uncertainty_ = std::move(uncertainty);
     copy.version_ = next_version();
   }
   return copy;

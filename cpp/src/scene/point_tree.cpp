@@ -82,7 +82,9 @@ std::size_t groups(std::size_t count, int of) {
 }  // namespace
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities)
-    : PointTree(points, radii, velocities, spatial_order(points)) {}
+    : PointTree(points, radii, velocities, spatial_order(points)) {
+  in_usual_order_ = true;
+}
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
                      std::vector<int> order)
@@ -117,6 +119,17 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
   }
   parts_ = {{0, static_cast<int>(leaves), static_cast<int>(resting_leaves), fastest_}};
   build(leaves);
+}
+
+PointTree PointTree::moving(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii,
+                            const Eigen::Matrix3Xd& velocities) const {
+  PointTree made(points, radii, velocities, order_);
+  // Where all points rested, or all moved, they stand as their places alone have it.
+  const bool by_place = std::all_of(parts_.begin(), parts_.end(), [](const Part& part) {
+    return part.first_moving == part.first_leaf || part.first_moving == part.first_leaf + part.num_leaves;
+  });
+  made.in_usual_order_ = in_usual_order_ && by_place;
+  return made;
 }
 
 PointTree PointTree::join(const std::vector<const PointTree*>& trees) {
@@ -228,6 +241,7 @@ void PointTree::advance(std::size_t part, double duration) noexcept {
   if (!(moved.fastest > 0.0)) {
     return;
   }
+  in_usual_order_ = false;
   const int end = moved.first_leaf + moved.num_leaves;
   for (int leaf = moved.first_moving; leaf < end; ++leaf) {
     const std::size_t first = static_cast<std::size_t>(leaf) * leaf_size;
@@ -242,6 +256,7 @@ void PointTree::advance(std::size_t part, double duration) noexcept {
 
 void PointTree::freeze(std::size_t part) noexcept {
   Part& frozen = parts_[part];
+  in_usual_order_ = in_usual_order_ && !(frozen.fastest > 0.0);
   frozen.fastest = 0.0;
   for (std::size_t c = 4; c < num_columns; ++c) {
     const auto begin = columns_[c].begin() + std::ptrdiff_t{frozen.first_leaf} * leaf_size;
@@ -252,6 +267,7 @@ void PointTree::freeze(std::size_t part) noexcept {
 
 void PointTree::hide(std::size_t part) noexcept {
   freeze(part);
+  in_usual_order_ = false;
   const Part& hidden = parts_[part];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto begin = columns_[axis].begin() + std::ptrdiff_t{hidden.first_leaf} * leaf_size;

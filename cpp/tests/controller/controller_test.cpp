@@ -9,6 +9,7 @@
 
 #include "sidestep/controller/motion.hpp"
 #include "support/allocations.hpp"
+#include "support/covered_arm.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
 

@@ -317,6 +317,40 @@ BOOST_AUTO_TEST_CASE(points_that_outweigh_the_one_that_touches_hide_nothing) {
   BOOST_TEST(controller.workspace().clearances.values[command.coordinate] > 0.0);  // the mean, which is smooth
 }
 
+BOOST_AUTO_TEST_CASE(a_paused_arm_rests_within_its_limits_and_goes_on_to_its_goal) {
+  ControllerSettings settings;
+  settings.synchronous = true;
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  const JointLimits& limits = arm.robot().limits();
+  Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
+  controller.set_goal(Eigen::VectorXd::Constant(nv, 0.8));
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q;
+  const auto steps = [&](int number) {
+    for (int k = 0; k < number; ++k) {
+      const Command& command = controller.step(q, v);
+      for (Eigen::Index j = 0; j < nv; ++j) {
+        BOOST_REQUIRE(std::abs(command.acceleration[j]) <= limits.acceleration[j] * (1.0 + 1e-9));  // rounding
+      }
+      v += settings.period * command.acceleration;
+      q += settings.period * v;
+    }
+  };
+  steps(300);
+  BOOST_TEST(v.cwiseAbs().maxCoeff() > 0.05);
+  controller.pause();
+  BOOST_TEST(controller.is_paused());
+  steps(1500);
+  BOOST_TEST(v.cwiseAbs().maxCoeff() < 1e-3);
+  BOOST_TEST(to_string(controller.command().activity) == "waiting");
+  BOOST_TEST(controller.explain() == "paused: the arm rests until `resume`");
+  const Eigen::VectorXd rest = q;
+  controller.resume();
+  steps(8000);
+  BOOST_TEST(to_string(controller.command().activity) == "arrived");
+  BOOST_TEST((q - rest).cwiseAbs().maxCoeff() > 0.1);
+}
+
 BOOST_AUTO_TEST_CASE(a_state_that_is_unusable_stops_the_arm_and_is_said) {
   ControllerSettings settings;
   settings.synchronous = true;
@@ -356,4 +390,49 @@ BOOST_AUTO_TEST_CASE(torque_without_inertias_needs_the_mass_matrix_in_every_step
   const Eigen::MatrixXd mass = 0.3 * Eigen::MatrixXd::Identity(nv, nv);
   BOOST_TEST(to_string(controller.step(q, v, mass, Eigen::VectorXd::Constant(nv, 1.0)).status) == "ok");
   BOOST_TEST(to_string(controller.step(q, v).status) == "stopping");
+}
+
+BOOST_AUTO_TEST_CASE(goes_on_from_where_drives_say_that_they_are) {
+  ControllerSettings settings;
+  settings.synchronous = true;
+  settings.output = ControllerSettings::Output::position;
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  const JointLimits& limits = arm.robot().limits();
+  const double T = settings.period;
+  Controller controller(arm, settings);
+  controller.set_obstacles(Obstacles::none());
+  const Eigen::VectorXd goal = Eigen::VectorXd::Constant(nv, 0.8);
+  controller.set_goal(goal);
+  // The drives follow positions exactly: what they go on from, by backward differences.
+  Eigen::VectorXd p = Eigen::VectorXd::Zero(nv), v = p, a = p;
+  double jerk = 0.0;  // the largest as a share of its limit, after the first step
+  const auto take = [&](const Command& command) {
+    const Eigen::VectorXd next_v = (command.position - p) / T, next_a = (next_v - v) / T;
+    jerk = std::max(jerk, (next_a - a).cwiseAbs().cwiseQuotient(T * limits.jerk).maxCoeff());
+    p = command.position, v = next_v, a = next_a;
+  };
+  take(controller.step(p, v));
+  jerk = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    if (k % 100 == 50) {  // 8 cycles without a command
+      for (int lost = 0; lost < 8; ++lost) {
+        v += T * a;
+        p += T * v;
+      }
+      BOOST_TEST(test::allocations_of([&] { controller.continue_from(p, v, a); }) == 0U);
+    }
+    take(controller.step(p, v));
+  }
+  BOOST_TEST(jerk <= 1.0 + 1e-3);  // rounding of third differences
+  BOOST_TEST((p - goal).cwiseAbs().maxCoeff() < 1e-3);
+  // Numbers that are not, and outputs that drives do not track, change nothing.
+  controller.continue_from(Eigen::VectorXd::Constant(nv, NAN), v, a);
+  take(controller.step(p, v));
+  BOOST_TEST((p - goal).cwiseAbs().maxCoeff() < 1e-3);
+  settings.output = ControllerSettings::Output::acceleration;
+  Controller other(arm, settings);
+  other.set_obstacles(Obstacles::none());
+  other.step(p, v);
+  other.continue_from(0.5 * p, v, a);
+  BOOST_TEST((other.step(p, v).position - p).cwiseAbs().maxCoeff() < 1e-3);
 }

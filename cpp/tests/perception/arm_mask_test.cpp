@@ -166,6 +166,31 @@ BOOST_FIXTURE_TEST_CASE(a_link_around_the_camera_hides_nothing, Masked) {
   BOOST_TEST(std::isinf(mask.front()[60 * 160 + 80]));
 }
 
+BOOST_FIXTURE_TEST_CASE(pixels_that_fly_at_the_silhouette_are_edges, Masked) {
+  camera.translation_error = 0.01;
+  test::DepthScene scene;
+  scene.add_arm(arm.robot(), arm.body(), q);
+  std::vector<float> pixels = scene.image(camera);
+  std::replace_if(pixels.begin(), pixels.end(), [](float z) { return !(z > 0.0f); }, 2.5f);  // a wall
+  mark(pixels);
+  const std::vector<PixelLabel> labels(image.labels(), image.labels() + image.size());
+  int num = 0;
+  for (std::size_t i = 161; i + 161 < pixels.size() && num < 20; ++i) {
+    const auto shows_wall = [&](std::size_t k) { return labels[k] == PixelLabel::obstacle && pixels[k] > pixels[i] + 0.5f; };
+    if (labels[i] != PixelLabel::arm || !shows_wall(i + 1) || !shows_wall(i + 2) || !shows_wall(i + 161)) {
+      continue;
+    }
+    std::vector<float> flying = pixels;
+    for (const std::size_t k : {i + 1, i + 2, i + 161}) {  // three that support each other
+      flying[k] = 0.5f * (pixels[i] + pixels[k]);
+    }
+    mark(flying);
+    BOOST_TEST((image.labels()[i + 1] == PixelLabel::edge));
+    ++num;
+  }
+  BOOST_TEST(num == 20);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_mask_allocates_nothing, Masked) {
   mark(std::vector<float>(image.size(), 1.2f));
   const KinematicState state = test::state_at(arm.robot(), q);

@@ -8,6 +8,15 @@
 
 using namespace sidestep;
 
+namespace {
+
+bool is_single(double value) {
+  const volatile float rounded = static_cast<float>(value);  // in memory: compilers drop casts there and back in vectors
+  return static_cast<double>(rounded) == value;
+}
+
+}  // namespace
+
 BOOST_AUTO_TEST_CASE(a_ball_behind_holds_its_box) {
   test::Random random(1);
   for (int n = 0; n < 200; ++n) {
@@ -21,6 +30,17 @@ BOOST_AUTO_TEST_CASE(a_ball_behind_holds_its_box) {
       farthest = std::max(farthest, (p - ball.centre).norm());
     }
     BOOST_TEST(farthest <= ball.radius + 1e-12);
+    const CellBall rounded = in_single_precision(ball);
+    BOOST_TEST((is_single(rounded.centre.x()) && is_single(rounded.centre.y()) && is_single(rounded.centre.z())));
+    BOOST_TEST(is_single(rounded.radius));
+    BOOST_TEST((rounded.centre - ball.centre).norm() + ball.radius <= rounded.radius);
+    BOOST_TEST((rounded.centre - ball.centre).cwiseAbs().maxCoeff() <= std::ldexp(ball.centre.cwiseAbs().maxCoeff(), -23));
+    BOOST_TEST(rounded.radius <= ball.radius + 1e-6);
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d p(corner & 1 ? high.x() : low.x(), corner & 2 ? high.y() : low.y(),
+                              corner & 4 ? high.z() : low.z());
+      BOOST_TEST((p - rounded.centre).norm() <= rounded.radius + 1e-15);
+    }
     BOOST_TEST((ball.centre - middle).norm() == 0.01, boost::test_tools::tolerance(1e-9));
     BOOST_TEST((ball.centre - middle).dot(middle - eye) > -1e-12);  // away from the camera
   }

@@ -55,6 +55,77 @@ BOOST_FIXTURE_TEST_CASE(a_wire_and_a_striped_image_are_no_edges, Taken) {
   BOOST_TEST((label(71, 60) == PixelLabel::nothing));
 }
 
+// The arm, at 1 m, in the left half of an image; what is beside it in the right half.
+struct BesideArm : Taken {
+  static constexpr int first = 80;  // column beside the arm
+
+  void beside(float (*depth)(int)) {
+    for (int v = 0; v < 120; ++v) {
+      for (int u = first; u < 160; ++u) {
+        at(u, v) = depth(u - first);
+      }
+    }
+  }
+  void take_with_arm() {
+    take();
+    for (int v = 0; v < 120; ++v) {
+      std::fill_n(image.labels() + v * 160, first, PixelLabel::arm);
+    }
+    image.mark_edges_of_arm(camera);
+  }
+  int edges() const { return image.count(PixelLabel::edge); }
+};
+
+BOOST_FIXTURE_TEST_CASE(pixels_that_fly_side_by_side_at_the_arm_are_edges, BesideArm) {
+  for (const float behind : {2.0f, 0.5f}) {
+    beside([](int) { return 0.0f; });
+    for (int i = 0; i < 160 * 120; ++i) {
+      pixels[static_cast<std::size_t>(i)] = pixels[static_cast<std::size_t>(i)] == 1.0f ? 1.0f : behind;
+    }
+    const float between = 0.5f * (1.0f + behind);
+    at(80, 50) = between;
+    at(80, 51) = at(81, 51) = between + 0.01f;  // they support each other
+    at(120, 50) = at(121, 50) = at(121, 51) = between;
+    take();
+    BOOST_TEST((label(80, 50) == PixelLabel::obstacle));
+    take_with_arm();
+    BOOST_TEST((label(80, 50) == PixelLabel::edge));
+    BOOST_TEST((label(80, 51) == PixelLabel::edge));
+    BOOST_TEST((label(81, 51) == PixelLabel::edge));
+    BOOST_TEST(edges() == 3);  // those far from the arm may be something
+    BOOST_TEST(image.count(PixelLabel::arm) == 80 * 120);
+  }
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_between_two_links_in_depth_flies, BesideArm) {
+  beside([](int) { return 1.3f; });
+  at(80, 50) = at(80, 51) = at(81, 50) = 1.27f;  // nearer to the farther link than slopes explain elsewhere
+  take_with_arm();
+  BOOST_TEST(edges() == 0);
+  for (int v = 0; v < 120; ++v) {
+    std::fill_n(image.labels() + v * 160 + 82, 78, PixelLabel::arm);  // the other link
+  }
+  image.mark_edges_of_arm(camera);
+  BOOST_TEST((label(80, 50) == PixelLabel::edge));
+  BOOST_TEST(edges() == 3);
+}
+
+BOOST_FIXTURE_TEST_CASE(surfaces_beside_the_arm_are_no_edges, BesideArm) {
+  beside([](int) { return 2.0f; });
+  take_with_arm();
+  BOOST_TEST(edges() == 0);
+  beside([](int across) { return across < 5 ? 1.5f : 2.0f; });  // a post in front of a wall
+  take_with_arm();
+  BOOST_TEST(edges() == 0);
+  beside([](int across) { return 1.2f + 0.01f * static_cast<float>(across); });  // a wall seen at 53 degrees
+  take_with_arm();
+  BOOST_TEST(edges() == 0);
+  beside([](int across) { return across < 40 ? 0.99f : 1.01f; });  // what touches the arm
+  take_with_arm();
+  BOOST_TEST(edges() == 0);
+  BOOST_TEST(test::allocations_of([&] { image.mark_edges_of_arm(camera); }) == 0u);
+}
+
 BOOST_FIXTURE_TEST_CASE(ranges_and_what_is_nothing, Taken) {
   at(10, 10) = 0.05f;  // nearer than 0.1 m
   at(20, 10) = 6.0f;   // beyond 4 m

@@ -198,7 +198,7 @@ BOOST_FIXTURE_TEST_CASE(images_come_while_steps_go_on, Watched) {
   }
   camera_thread.join();
   BOOST_TEST(perception->time("front") >= 10.0);
-  BOOST_TEST(controller.time() == now);
+  BOOST_TEST(controller.time() == now, boost::test_tools::tolerance(1e-14));  // own clock and back: two roundings
 }
 
 BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {
@@ -210,6 +210,65 @@ BOOST_FIXTURE_TEST_CASE(a_blind_camera_is_not_believed, Watched) {
   BOOST_TEST(!report.used);
   BOOST_TEST(report.question.find("sees nothing") != std::string::npos);
   BOOST_TEST(said("front") == nullptr);
+}
+
+BOOST_FIXTURE_TEST_CASE(an_image_that_is_not_used_moves_nothing, Watched) {
+  start();
+  step();
+  look();
+  look();
+  const std::vector<Perception::Cell> before = perception->cells();
+  BOOST_REQUIRE(before.size() > 100u);
+  Eigen::Isometry3d elsewhere = camera.pose;
+  elsewhere.translation() += Eigen::Vector3d(-3.0, 1.0, 0.5);
+  const std::vector<float> nothing(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), 0.0f);
+  BOOST_TEST(!perception->update("front", RawDepth{std::span<const float>(nothing), 1.0}, Capture{time, {}, elsewhere}).used);
+  BOOST_TEST(perception->pose("front").isApprox(elsewhere));  // of the image that depth and labels show
+  const std::vector<Perception::Cell> after = perception->cells();
+  BOOST_REQUIRE(after.size() == before.size());
+  double moved = 0.0;
+  for (std::size_t n = 0; n < before.size(); ++n) {
+    moved = std::max(moved, (after[n].centre - before[n].centre).norm());
+  }
+  BOOST_TEST(moved == 0.0);
+}
+
+BOOST_FIXTURE_TEST_CASE(an_image_that_shows_little_but_the_arm_shows_the_arm, Watched) {
+  // As that of an eye in hand, too near to what it looks at: fewer than 1 % of the pixels have a depth, and those show links.
+  const KinematicState state = test::state_at(arm.robot(), q);
+  const Eigen::Isometry3d X_WC = camera.pose;
+  camera.link = "tip";
+  camera.pose = frame_pose(arm.robot(), state, arm.robot().frame_index("tip")).inverse() * X_WC;
+  start();
+  step();
+  std::vector<float> pixels = scene.image(camera, X_WC);
+  const auto update = [&] {
+    return perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  };
+  update();
+  const std::vector<PixelLabel> whole = perception->labels("front");
+  int kept = 0;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    pixels[i] = whole[i] == PixelLabel::arm && kept < 190 ? pixels[i] : 0.0f;
+    kept += pixels[i] > 0.0f ? 1 : 0;
+  }
+  BOOST_TEST(kept == 190);  // of 19,200
+  const int before = points("front", {0.2, 0.9, 0.5}, 0.17);
+  const PerceptionReport report = update();
+  BOOST_TEST(!report.used);
+  BOOST_TEST(report.question.find("sees nothing") != std::string::npos);
+  BOOST_TEST(report.arm_pixels == 190);
+  BOOST_TEST(report.obstacle_pixels == 0);
+  const std::vector<PixelLabel> labels = perception->labels("front");
+  BOOST_TEST(std::count(labels.begin(), labels.end(), PixelLabel::arm) == 190);
+  BOOST_TEST(points("front", {0.2, 0.9, 0.5}, 0.17) == before);
+  const double used = time;
+  time += 0.03;
+  q[3] += 0.05;
+  step();
+  BOOST_TEST(!update().used);
+  BOOST_TEST((perception->pose("front").matrix() - X_WC.matrix()).norm() > 0.01);  // its labels belong to where it is now
+  BOOST_TEST(perception->time("front") == used);
 }
 
 BOOST_FIXTURE_TEST_CASE(an_image_that_sees_through_the_arm_is_not_used, Watched) {
@@ -272,6 +331,8 @@ BOOST_FIXTURE_TEST_CASE(wrong_calls_name_what_is_allowed, Watched) {
   const RawDepth depth{std::span<const float>(pixels), 1.0};
   BOOST_TEST(message([&] { perception->update("back", depth, Capture{1.0, {}, std::nullopt}); }) ==
              "perception: there is no camera 'back', there are: 'front'");
+  BOOST_TEST(message([&] { perception->camera("back"); }) == "perception: there is no camera 'back', there are: 'front'");
+  BOOST_TEST(perception->camera("front").name == "front");
   BOOST_TEST(message([&] { perception->update("front", depth, Capture{1.0, Eigen::VectorXd::Zero(3), std::nullopt}); }) ==
              "perception: q has 3 entries, allowed: 4, all finite");
   BOOST_TEST(message([&] { Perception(controller, {}); }) == "perception: there are 0 cameras, allowed: 1 to 16");

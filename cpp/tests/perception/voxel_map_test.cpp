@@ -5,8 +5,10 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <vector>
 
+#include "sidestep/perception/steady_depth.hpp"
 #include "sidestep/perception/unseen_space.hpp"
 #include "support/allocations.hpp"
 #include "support/depth_scene.hpp"
@@ -24,7 +26,7 @@ struct Mapped {
   double time = 1.0;
   std::vector<float> pixels;
 
-  SeenImage seen() { return {camera, rays, camera.pose, image, no_arm.data(), 0, time}; }
+  SeenImage seen() { return {camera, rays, camera.pose, image, image.depth(), no_arm.data(), 0, time}; }
   void take(const test::DepthScene& scene) {
     pixels = scene.image(camera);
     image.take(camera, {std::span<const float>(pixels), 1.0});
@@ -65,6 +67,66 @@ test::DepthScene wall_and_ball() {
 }
 
 }  // namespace
+
+/// A wall at x = -0.5 m, and noise of which each patch of 5 x 5 pixels has the same, as of a camera that matches windows.
+struct Noisy : Mapped {
+  std::mt19937 random{3};
+  const Eigen::Vector3d wall_at{-0.5, 0.0, 0.5};
+
+  Noisy() {
+    camera.noise = {0.015, 0.0};
+    camera.fx = camera.fy = 400.0;  // pixels of 5 mm at the wall
+    rays = CameraRays(camera);
+  }
+  void look(SteadyDepth& steady) {
+    test::DepthScene scene;
+    scene.add_sphere({wall_at.x() - 100.0, 0.0, 0.5}, 100.0);
+    pixels = scene.image(camera);
+    std::normal_distribution<float> normal(0.0f, 0.015f);
+    for (int v = 0; v < 120; v += 5) {
+      for (int u = 0; u < 160; u += 5) {
+        const float error = normal(random);
+        for (int i = 0; i < 25; ++i) {
+          pixels[static_cast<std::size_t>((v + i / 5) * 160 + u + i % 5)] += error;
+        }
+      }
+    }
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    steady.add(camera, image);
+    SeenImage shown = seen();
+    shown.depth = steady.depth();
+    map.add(shown);
+    time += 1.0 / 30.0;
+  }
+  /// Share of the cells that count at the middle of the wall and stand out of it by more than some metres.
+  double share_beyond(double out) const {
+    int num = 0, beyond = 0;
+    for (const Voxel& voxel : map.voxels()) {
+      const Eigen::Vector3d from = voxel.middle() - wall_at;
+      if (voxel.cell >= 0 && voxel.counts && from.tail<2>().norm() < 0.2) {
+        ++num;
+        beyond += from.x() > out ? 1 : 0;
+      }
+    }
+    return num == 0 ? -1.0 : static_cast<double>(beyond) / num;
+  }
+};
+
+BOOST_FIXTURE_TEST_CASE(noise_does_not_make_a_surface_thick, Noisy) {
+  const auto most_beyond = [&](int images) {
+    map.clear();
+    SteadyDepth steady(camera, images);
+    double most = 0.0;
+    for (int n = 0; n < 90; ++n) {
+      look(steady);
+      most = n < 30 ? 0.0 : std::max(most, share_beyond(0.02));
+    }
+    BOOST_TEST(share_beyond(-0.04) > 0.9);  // the wall itself is there
+    return most;
+  };
+  BOOST_TEST(most_beyond(1) > 0.15);
+  BOOST_TEST(most_beyond(8) < 0.04);
+}
 
 BOOST_FIXTURE_TEST_CASE(boxes_hold_all_points_that_were_seen, Mapped) {
   add(wall_and_ball());

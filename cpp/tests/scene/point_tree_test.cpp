@@ -151,6 +151,40 @@ BOOST_AUTO_TEST_CASE(joined_sets_are_one_tree_whose_parts_move_by_themselves) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(the_order_is_said_to_be_the_usual_one_only_where_it_is) {
+  Random random(12);
+  const Eigen::Index num = 500;
+  Eigen::Matrix3Xd points(3, num), some = Eigen::Matrix3Xd::Zero(3, num), others = some;
+  for (Eigen::Index n = 0; n < num; ++n) {
+    points.col(n) = random.vector(3);
+    some.col(n) = n % 3 == 0 ? Eigen::Vector3d(random.vector(3)) : Eigen::Vector3d::Zero();
+    others.col(n) = n % 7 == 0 ? Eigen::Vector3d(random.vector(3)) : Eigen::Vector3d::Zero();
+  }
+  const Eigen::VectorXd radii = Eigen::VectorXd::Constant(num, 0.01), uncertainty = Eigen::VectorXd::Constant(num, 0.1);
+  const Obstacles rest(points, radii, Eigen::Matrix3Xd::Zero(3, num)), moving(points, radii, some);
+  BOOST_TEST(rest.tree().is_in_usual_order());
+  BOOST_TEST(moving.tree().is_in_usual_order());
+  BOOST_TEST((moving.tree().order() != rest.tree().order()));
+  const Obstacles found = rest.moving(some, uncertainty);
+  BOOST_TEST(found.tree().is_in_usual_order());
+  BOOST_TEST((found.tree().order() == moving.tree().order()));
+  BOOST_TEST(moving.moving(some, uncertainty).tree().is_in_usual_order());
+  const Obstacles other = moving.moving(others, uncertainty);  // those that moved before stand behind
+  BOOST_TEST(!other.tree().is_in_usual_order());
+  BOOST_TEST((other.tree().order() != Obstacles(points, radii, others).tree().order()));
+  Obstacles moved = moving;
+  BOOST_TEST(moved.advance(0.5));
+  BOOST_TEST(!moved.tree().is_in_usual_order());
+  BOOST_TEST(!moving.frozen().tree().is_in_usual_order());
+  BOOST_TEST(rest.frozen().tree().is_in_usual_order());
+  Obstacles still = rest;
+  BOOST_TEST(still.advance(0.5));
+  BOOST_TEST(still.tree().is_in_usual_order());
+  BOOST_TEST(!Obstacles::join({&rest, &moving}).tree().is_in_usual_order());
+  still.hide(0);
+  BOOST_TEST(!still.tree().is_in_usual_order());
+}
+
 BOOST_AUTO_TEST_CASE(points_get_other_velocities_and_say_how_uncertain_they_are) {
   const Obstacles ball(Eigen::Vector3d::Zero(), Eigen::VectorXd::Constant(1, 0.1), Eigen::Vector3d::Zero());
   Obstacles moving = ball.moving(Eigen::Vector3d(1.0, 0.0, 0.0), Eigen::VectorXd::Constant(1, 0.5));

@@ -78,5 +78,9 @@ from .step import compare_steps as compare_steps
 from .step import run_step_bench as run_step_bench
 from .tracker import After as After
 from .tracker import Told as Told
+from .two_programs import TwoProgramsSettings as TwoProgramsSettings
+from .two_programs import is_clean as is_clean
+from .two_programs import run_two_programs as run_two_programs
+from .two_programs import two_programs_table as two_programs_table
 from .workspace import SweptSpace as SweptSpace
 from .workspace import Workspace as Workspace

@@ -7,16 +7,18 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from time import perf_counter, sleep, thread_time
+from time import monotonic, sleep, thread_time
 from typing import Any
 
 import numpy as np
 
-from sidestep._core import Controller, ControllerSettings, RealTimeRun
+from sidestep._core import Controller, ControllerSettings, Loop
 from sidestep.arm import Arm
 from sidestep.bench.camera_room import IMAGE_PERIOD, CameraImages, swing
 from sidestep.bench.camera_stages import CameraCase, spread_ms
 from sidestep.bench.step_times import StepTimes
+from sidestep.drivers import Ideal
+from sidestep.loop import LoopSettings
 from sidestep.perception import Perception
 
 STEPS_PER_SECOND = 1000
@@ -160,10 +162,12 @@ class BesideRow:
         q = self._q
         with on_cores(self._loop_cores):
             self._controller.set_goal(q)
-            run = RealTimeRun(
-                self._controller, q, np.zeros_like(q), steps=max(1, round(STEPS_PER_SECOND * seconds))
-            )
-        begin = perf_counter()
+            steps = max(1, round(STEPS_PER_SECOND * seconds))
+            # A machine that is too busy is what is measured: it ends no run.
+            kept = LoopSettings(kept_times=steps, longest_gap=10.0, duration=seconds)
+            run = Loop(self._controller, Ideal(self._arm, q), kept)
+            run.start()
+        begin = monotonic()
         thread = threading.Thread(target=self._look, args=(run, self._number))
         if self.load.cameras:
             thread.start()
@@ -171,55 +175,56 @@ class BesideRow:
         if self.load.cameras:
             thread.join()
         record = run.finish()
-        self._q = run.state()[0]
-        self._number += 1 + int(np.ceil(self.load.rate * (perf_counter() - begin)))
+        self._q = run.state().q
+        self._number += 1 + int(np.ceil(self.load.rate * (monotonic() - begin)))
         self._taken.add(record.taken)
         self._late.add(record.late)
         self._missed += record.missed
         self._prioritised = record.prioritised
 
     def _look_around(self) -> None:
+        begin = monotonic()
         for number in range(len(self._seen[0].frames)):
             for each in self._seen:
-                self._update(each, number, (number - len(each.frames)) * IMAGE_PERIOD)
+                self._update(each, number, begin + (number - len(each.frames)) * IMAGE_PERIOD)
         self._number = len(self._seen[0].frames)
 
-    def _send_about(self, run: RealTimeRun) -> None:
-        goal, begin = 0, perf_counter()
-        while run.running:
-            number = 1 + int((perf_counter() - begin) / TOWARDS)
+    def _send_about(self, run: Loop) -> None:
+        goal, begin = 0, monotonic()
+        while not run.is_stopping:
+            number = 1 + int((monotonic() - begin) / TOWARDS)
             if number != goal:
                 goal = number
                 self._controller.set_goal(swing(self._arm, 7 * goal % GOALS, GOALS))
             sleep(0.01)
 
-    def _look(self, run: RealTimeRun, first: int) -> None:
+    def _look(self, run: Loop, first: int) -> None:
         """Takes the newest image of each camera in turn; all come at the same times, the worst there is."""
         with on_cores(self._own_core):
-            begin, period, busy = perf_counter(), 1.0 / self.load.rate, thread_time()
+            begin, period, busy = monotonic(), 1.0 / self.load.rate, thread_time()
             next_of = [0] * len(self._seen)
-            while run.running:
+            while not run.is_stopping:
                 idle = True
                 for k, each in enumerate(self._seen):
-                    newest = int((perf_counter() - begin) / period)
+                    newest = int((monotonic() - begin) / period)
                     if newest < next_of[k]:
                         continue
                     idle = False
                     start = thread_time()
                     number = first + newest
-                    self._update(each, number, (number - len(each.frames)) * period)
+                    self._update(each, number, begin + newest * period)
                     self._lost.count(
                         due=newest * period,
-                        done=perf_counter() - begin,
+                        done=monotonic() - begin,
                         thread=thread_time() - start,
                         skipped=newest - next_of[k],
                         period=period,
                     )
                     next_of[k] = newest + 1
                 if idle:
-                    sleep(max(0.0, min(next_of) * period - (perf_counter() - begin)))
+                    sleep(max(0.0, min(next_of) * period - (monotonic() - begin)))
             self._lost.busy += thread_time() - busy
-            self._lost.seconds += perf_counter() - begin
+            self._lost.seconds += monotonic() - begin
 
     def _update(self, images: CameraImages, number: int, time: float) -> None:
         """Takes image `number` as if it was captured at a time [s]."""

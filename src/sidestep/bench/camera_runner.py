@@ -17,6 +17,7 @@ from sidestep.bench.motion import Columns, Motion, MotionSettings
 from sidestep.bench.problem import SceneProblem
 from sidestep.bench.sight_log import SurfaceLog
 from sidestep.bench.workspace import Workspace
+from sidestep.loop import ModelLoop
 
 Array = npt.NDArray[np.float64]
 
@@ -125,7 +126,7 @@ class _Loop:
     """See, step, integrate: v += a T, q += v T."""
 
     def __init__(self, controller: Controller, rig: CameraRig, start: Array, period: float) -> None:
-        self._controller, self._rig, self._period = controller, rig, period
+        self._loop, self._rig, self._period = ModelLoop(controller), rig, period
         self._q, self._v, self._step = start, np.zeros_like(start), 0
 
     def rest(self, steps: int) -> None:
@@ -148,4 +149,4 @@ class _Loop:
         now = self._step * self._period
         self._step += 1
         self._rig.see(now, self._q)
-        return np.array(self._controller.step(self._q, self._v, time=now).acceleration)
+        return np.array(self._loop.cycle(self._q, self._v, time=now).acceleration)

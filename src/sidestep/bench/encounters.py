@@ -19,6 +19,7 @@ from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import poses_over
 from sidestep.bench.sensor_fault import SensorFault, fastest_contact, first_word
 from sidestep.distance import ExactClearance, SceneObject
+from sidestep.loop import ModelLoop
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -194,6 +195,7 @@ def run_encounter(
             output=output, synchronous=True, seed=encounter.index, period=encounter.period, **settings
         ),
     )
+    loop = ModelLoop(controller)
     columns: dict[str, list[Array]] = {"q": [], "v": [], "a": [], "torque": [], "commanded": []}
     statuses: list[str] = []
     fault, explained = encounter.fault, ""
@@ -203,7 +205,7 @@ def run_encounter(
         encounter.tell(controller, step, q)
         sensed = encounter.sense(step, q, v)
         if sensed is not None or not statuses:
-            controller.step(*(sensed or (q, v)), time=step * PERIOD)
+            loop.cycle(*(sensed or (q, v)), time=step * PERIOD)
         command = controller.command
         values = q, v, command.acceleration, command.torque, command.position
         for name, value in zip(columns, values, strict=True):

@@ -7,18 +7,21 @@ from time import sleep
 
 import numpy as np
 
-from sidestep._core import Controller, ControllerSettings, Obstacles, PoseGoal, RealTimeRun
+from sidestep._core import Controller, ControllerSettings, Loop, Obstacles, PoseGoal
 from sidestep.bench.recorded_motions import Array, pose_at_point, ready_arm, table
+from sidestep.drivers import Ideal
 from sidestep.obstacles import Cylinder
 
-STEPS = 2000
+DURATION = 2.0  # [s]
 
 
 def _run(controller: Controller, q: Array, v: Array, act: Callable[[float], None]) -> None:
     """Steps by the machine's clock, with planner, look-ahead and posture search in their threads."""
-    run = RealTimeRun(controller, q, v, steps=STEPS)
-    seen = 0
-    while run.running:
+    run = Loop(controller, Ideal(controller.arm, q, v=v), duration=DURATION)
+    act(0.0)
+    run.start()
+    seen = 1
+    while not run.is_stopping:
         act(0.033 * seen)
         seen += 1
         sleep(0.033)

@@ -8,13 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from sidestep._core import ReplayResult
+from sidestep._core import ReplayResult, black_box_begin, recording_suffix
 from sidestep._core import replay as replay_one
 from sidestep.bench.parallel import Progress
-from sidestep.bench.recorded_cases import cases
 
 FOLDER_VARIABLE = "SIDESTEP_RECORD"  # names the folder in which every controller of a program is recorded
-SUFFIX = ".step"
+SUFFIXES = (recording_suffix, ".step")  # what can be replayed; the second is of Sidestep 0.2
 
 
 @contextmanager
@@ -38,7 +37,7 @@ def record_all(
 
     Args:
         folder: must be new, or have no recordings.
-        only: names of cases to record, see `cases`; all if there are none.
+        only: names of cases to record, see `recorded_cases.cases`; all if there are none.
         progress: told of how many are done, of all, and a word about the last one.
 
     Returns:
@@ -47,10 +46,12 @@ def record_all(
     Raises:
         ValueError: an unknown case; the folder has recordings already.
     """
+    from sidestep.bench.recorded_cases import cases  # not above: who replays needs no simulator
+
     chosen = cases()
     if unknown := sorted(set(only) - {case.name for case in chosen}):
         raise ValueError(f"no case {unknown[0]!r}; there are: {', '.join(case.name for case in chosen)}")
-    if next(folder.rglob(f"*{SUFFIX}"), None) is not None:
+    if _recordings_below(folder):
         raise ValueError(f"{folder} has recordings already; name a new folder")
     chosen = [case for case in chosen if not only or case.name in only]
     left_out = []
@@ -64,7 +65,7 @@ def record_all(
                 left_out.append(f"{case.name}: {error}")
     if progress is not None:
         progress(len(chosen), len(chosen), "done")
-    return sorted(folder.rglob(f"*{SUFFIX}")), left_out
+    return sorted(folder.rglob(f"*{recording_suffix}")), left_out
 
 
 def replay_all(
@@ -81,9 +82,9 @@ def replay_all(
     """
     files: list[Path] = []
     for path in paths:
-        files += sorted(path.rglob(f"*{SUFFIX}")) if path.is_dir() else [path]
+        files += _recordings_below(path) if path.is_dir() else [path]
     if not files:
-        raise ValueError(f"{', '.join(map(str, paths))}: there is no recording (*{SUFFIX})")
+        raise ValueError(f"{', '.join(map(str, paths))}: there is no recording (*{recording_suffix})")
     results = []
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         for path, result in zip(files, pool.map(replay_one, files), strict=True):
@@ -91,3 +92,8 @@ def replay_all(
             if progress is not None:
                 progress(len(results), len(files), f"{path.name}: {'equal' if result.equal else 'not equal'}")
     return results
+
+
+def _recordings_below(folder: Path) -> list[Path]:
+    found = [path for suffix in SUFFIXES for path in folder.rglob(f"*{suffix}")]
+    return sorted(path for path in found if not path.name.startswith(black_box_begin))

@@ -83,7 +83,7 @@ def camera_mask(
         or ghosts["told"]["near_arm"] > 0
         or (told["beyond_told"]["max"] or 0.0) > MOST_BEYOND
     )
-    document = {"bench": "camera-mask", "size": size, "tables": tables, "ghosts": ghosts, "rows": rows}
+    document = {"bench": "camera-mask", "size": size, "tables": tables, "ghosts": ghosts}  # rows: --file
     end_with(_mask_figures(tables, ghosts), document, json, quiet, bad=bad)
 
 

@@ -20,12 +20,11 @@ from sidestep.cli.bench_output import (
     FailuresOption,
     JobsOption,
     SeedOption,
+    SizeOption,
     TorqueOption,
     figures_table,
 )
 from sidestep.cli.output import JsonOption, QuietOption, console
-
-SizeOption = Annotated[str, typer.Option("--size", help="Of the images: 848x480 or 424x240.")]
 
 
 def camera_scenes(

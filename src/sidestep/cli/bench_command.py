@@ -12,6 +12,7 @@ from sidestep.cli.bench_camera_command import camera_mask, camera_recording
 from sidestep.cli.bench_camera_loop_command import camera_moving, camera_scenes
 from sidestep.cli.bench_camera_times_command import camera_times
 from sidestep.cli.bench_encounters_command import drives, faults, moving
+from sidestep.cli.bench_kills_command import kills
 from sidestep.cli.bench_output import (
     DurationOption,
     FailuresOption,
@@ -27,6 +28,7 @@ from sidestep.cli.bench_output import (
 )
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
 from sidestep.cli.bench_step_command import compare, peers, points, qp, realtime, step
+from sidestep.cli.bench_two_programs_command import two_programs
 from sidestep.cli.limit_options import (
     AccelerationLimitOption,
     EffortLimitOption,
@@ -46,6 +48,8 @@ app.command("dynamic")(dynamic)
 app.command("drives")(drives)
 app.command("moving")(moving)
 app.command("faults")(faults)
+app.command("two-programs")(two_programs)
+app.command()(kills)
 app.command("camera-mask")(camera_mask)
 app.command("camera-recording")(camera_recording)
 app.command("camera-scenes")(camera_scenes)

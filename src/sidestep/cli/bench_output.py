@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 RobotOption: TypeAlias = Annotated[str, typer.Option(help="A name from `sidestep robots`.")]
+SizeOption: TypeAlias = Annotated[str, typer.Option(help="Of the images: 848x480 or 424x240.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of all that is random.")]
 MethodOption: TypeAlias = Annotated[Method, typer.Option(help="How the arm is moved.")]
 FinerOption: TypeAlias = Annotated[

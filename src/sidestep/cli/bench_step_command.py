@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.bench_output import RobotOption, RowSecondsOption, SeedOption, figures_table, with_status
+from sidestep.cli.bench_output import (
+    RobotOption,
+    RowSecondsOption,
+    SeedOption,
+    SizeOption,
+    figures_table,
+    with_status,
+)
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 
@@ -199,35 +206,71 @@ def realtime(
     points: Annotated[int, typer.Option(min=1, help="Points in the cloud of a table with objects.")] = 10_000,
     seconds: RowSecondsOption = 60.0,
     refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
+    camera: Annotated[
+        bool, typer.Option(help="A depth camera beside the recorder, which needs the meshes of the arm.")
+    ] = True,
+    size: SizeOption = "848x480",
+    row: Annotated[
+        list[str] | None,
+        typer.Option(help="clock, goals, clouds or recorder; may be repeated [default: all]."),
+    ] = None,
     seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """The controller, everything on, at 1 kHz by the machine's clock: how late it is, and what it misses.
 
-    Another thread sets goals, then goals and clouds of points. A step is late by the time from when it is due to when
-    it begins; it misses its deadline if it ends after the next one is due. Real-time scheduling is used where the
-    machine allows it. Exit code 0: misses are figures, not errors.
+    Beside it another thread sets goals, then goals and clouds of points, then goals and images of a depth camera while
+    every step is recorded and replayed afterwards; first a thread without a controller only reads the clock. A step is
+    late by the time from when it is due to when it begins; it misses its deadline if it ends after the next one is due.
+    Real-time scheduling is used where the machine allows it. Exit code: 1 where the replay is not equal bit for bit or
+    steps were not recorded, else 0; misses are figures, not errors.
     """
     from sidestep.bench import RealTimeBenchSettings, run_real_time_bench
+    from sidestep.bench.real_time import CLOCK, ROWS
 
-    settings = RealTimeBenchSettings(robot=robot, points=points, seconds=seconds, refresh=refresh, seed=seed)
+    settings = RealTimeBenchSettings(
+        robot=robot,
+        points=points,
+        seconds=seconds,
+        refresh=refresh,
+        camera=camera,
+        size=size,
+        seed=seed,
+        rows=tuple(row or ROWS),
+    )
     terminal = console(quiet=quiet, to_stderr=json == "-")
     document = with_status(terminal, lambda show: run_real_time_bench(settings, progress=show))
     rows = document["results"]
-    scheduled = "real-time scheduling" if rows[0]["real_time_scheduling"] else "no real-time scheduling"
+    scheduled = "real-time scheduling" if rows[-1]["real_time_scheduling"] else "no real-time scheduling"
     columns = ("steps", "missed", "us", "median", "p99", "p99.9", "max")
     table = figures_table("beside", *columns, title=f"{document['cpu']}, {scheduled}")
-    for row in rows:
-        for what, times in (("late", row["late_us"]), ("step", row["step_us"])):
-            first = (row["beside"], f"{row['steps']:,}", str(row["missed"])) if what == "late" else ("",) * 3
-            table.add_row(*first, what, *(f"{times[name]:.1f}" for name in ("median", "p99", "p99.9", "max")))
+    for found in rows:
+        for what, times in (("late", found["late_us"]), ("step", found["step_us"])):
+            first = (
+                (found["beside"], f"{found['steps']:,}", str(found["missed"]))
+                if what == "late"
+                else ("",) * 3
+            )
+            if what == "late" or found["beside"] != CLOCK:
+                table.add_row(
+                    *first, what, *(f"{times[name]:.1f}" for name in ("median", "p99", "p99.9", "max"))
+                )
     terminal.print(table)
-    beside = (row["beside"] for row in rows)
+    record = rows[-1].get("record")
+    if record is not None:
+        terminal.print(
+            f"recorded {record['steps']:,} steps, {record['bytes_a_minute'] / 1e6:.1f} MB a minute, "
+            f"{record['lost']} lost; replay {'equal bit for bit' if record['replay_equal'] else 'NOT equal'}, "
+            f"{record['replay_speed']:.1f} times as fast as the motion",
+            highlight=False,
+        )
+    beside = (found["beside"] for found in rows)
     histogram = figures_table("up to, us", *beside, title="steps by how late they began")
     edges = [*(str(edge) for edge in rows[0]["late_histogram"]["edges_us"]), "more"]
-    for edge, *counts in zip(edges, *(row["late_histogram"]["counts"] for row in rows), strict=True):
+    for edge, *counts in zip(edges, *(found["late_histogram"]["counts"] for found in rows), strict=True):
         histogram.add_row(edge, *(f"{count:,}" for count in counts))
     terminal.print(histogram)
     if json is not None:
         write_json(document, json)
+    raise typer.Exit(0 if record is None or (record["replay_equal"] and not record["lost"]) else 1)

@@ -16,8 +16,11 @@ from sidestep.cli import (
     list_commands,
     prepare_command,
     replay_command,
+    report_command,
     run_command,
+    serve_command,
     show_command,
+    simulate_command,
     studio_command,
 )
 from sidestep.extras import MissingExtraError
@@ -34,6 +37,7 @@ app = typer.Typer(
 )
 app.command("demo")(run_command.demo)
 app.command("run")(run_command.run)
+app.command("serve")(serve_command.serve)
 app.command("show")(show_command.show)
 app.command("studio")(studio_command.studio)
 app.command("scenarios")(list_commands.scenarios)
@@ -41,7 +45,9 @@ app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)
 app.command("fit")(fit_command.fit)
 app.command("prepare")(prepare_command.prepare)
+app.command("simulate")(simulate_command.simulate)
 app.command("replay")(replay_command.replay)
+app.command("report")(report_command.report)
 for name, command in plugins("sidestep.commands").items():
     app.command(name)(command)
 app.add_typer(camera_command.app, name="camera")

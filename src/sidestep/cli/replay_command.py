@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 def replay(
     recordings: Annotated[
-        list[Path], typer.Argument(exists=True, help="Recordings (.step), or folders with any below them.")
+        list[Path],
+        typer.Argument(exists=True, help="Recordings (.mcap; .step of 0.2), or folders with any below."),
     ],
     jobs: Annotated[int | None, typer.Option(min=1, help="Threads [default: one per processor].")] = None,
     json: JsonOption = None,

@@ -18,9 +18,12 @@ MODULES: dict[str, tuple[str, ...]] = {
     "simulation": ("matplotlib", "mujoco", "PIL", "yaml"),
     "camera": ("PIL", "rosbags"),
     "realsense": ("pyrealsense2",),
+    "ur": ("dashboard_client", "rtde_control", "rtde_receive"),
+    "franka": ("pylibfranka",),
     "studio": ("viser", "websockets"),
     "headless": ("av", "playwright"),
     "thesis": ("sklearn", "threadpoolctl"),
+    "zenoh": ("zenoh",),
     "bench": ("casadi", "pinocchio", "toppra"),
 }
 _CHAIN = ("prepare", "simulation", "studio", "headless")  # each holds those before it

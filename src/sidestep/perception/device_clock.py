@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import time
 
+from sidestep.perception.least_delay_clock import LeastDelayClock
+
 
 class DeviceClock:
     """Turns a RealSense's time stamps into times of `time.monotonic()`: stamp - since_exposure + offset - latency.
@@ -15,8 +17,8 @@ class DeviceClock:
       is that of the computer's two clocks, read anew for each image, so that a set clock does no harm.
     - system_time: the computer's clock when the image came. Images are older than that, by exposure and transport,
       20–40 ms: measure it and give it as `latency`.
-    - hardware_clock: a clock of the device. The offset is the least of (arrival - stamp) so far: right but for the
-      shortest transport, for which `latency` stands again.
+    - hardware_clock: a clock of the device. The offset is the least of (arrival - stamp) in the last 10 to 20 s
+      (`LeastDelayClock`): right but for the shortest transport, for which `latency` stands again.
 
     Attributes:
         domain: of the last stamp; "" before the first.
@@ -35,7 +37,7 @@ class DeviceClock:
         if not math.isfinite(latency):
             raise ValueError(f"latency is {latency} s, must be finite")
         self.domain, self.offset = "", math.nan
-        self._latency, self._least_delay = latency, math.inf
+        self._latency, self._device = latency, LeastDelayClock()
 
     def captured(self, stamp: float, domain: str, *, arrival: float, since_exposure: float) -> float:
         """When an image was captured, on the clock of `time.monotonic()` [s].
@@ -49,8 +51,8 @@ class DeviceClock:
         """
         self.domain = domain
         if domain == "hardware_clock":
-            self._least_delay = min(self._least_delay, arrival - stamp)
-            self.offset = self._least_delay
+            self._device.measured(stamp, arrival)
+            self.offset = self._device.offset
         else:
             self.offset = time.monotonic() - time.time()
         age = 0.0 if domain == "system_time" else since_exposure

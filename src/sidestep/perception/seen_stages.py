@@ -1,4 +1,4 @@
-"""What each stage of `Perception` made of an image, all at one time."""
+"""What each stage of `Perception` made of an image."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class SeenStages:
     Attributes:
         camera: that took the image.
         pose: of its optical frame in the world (4, 4) then.
-        time: of capture [s].
+        time: of capture of the last image that was used [s]; depth, labels and pose are of the last one, also where it
+            was refused.
         depth: (H, W) [m]; 0: nothing seen.
         labels: (H, W) of `PixelLabel`.
         centres, radii, ages: of the cells that count as obstacles, (N, 3) [m] in the world, (N,) [m], (N,) [s].

@@ -81,6 +81,45 @@ class Assembly:
         return self.posture.q
 
 
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The robot of a scenario at its start among its solids.
+
+    Attributes:
+        robot: as the scenario asks. start, start_velocity: (nv,) [rad | m].
+        solids: those of each obstacle, in the order of the file.
+    """
+
+    robot: Robot
+    start: Array
+    start_velocity: Array
+    solids: tuple[tuple[SceneObject, ...], ...]
+
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """All solids."""
+        return tuple(thing for things in self.solids for thing in things)
+
+
+def stage_of(scenario: Scenario) -> Stage:
+    """What physics needs of a scenario.
+
+    Raises:
+        ScenarioError: see `assemble`.
+    """
+    robot = _at("robot", scenario, partial(load_robot, scenario))
+    _at("simulation.mode", scenario, partial(check_torque, scenario, robot))
+    start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
+    velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
+    things = tuple(
+        _at(f"obstacles[{k}]", scenario, partial(solids, scenario, item, item.name or f"obstacle{k}"))
+        for k, item in enumerate(scenario.obstacles)
+    )
+    stage = Stage(robot, start, velocity, things)
+    _at("obstacles", scenario, partial(check_scene, stage.objects))
+    return stage
+
+
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
     """Builds the parts of a scenario and checks what its schema cannot.
 
@@ -93,21 +132,14 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
             unknown robot or frame, a file that is missing or malformed; names the key and what is allowed.
     """
     _at("simulation", scenario, scenario.check_steps)
-    robot = _at("robot", scenario, partial(load_robot, scenario))
-    _at("simulation.mode", scenario, partial(check_torque, scenario, robot))
-    start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
-    velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
-    objects: list[SceneObject] = []
+    stage = stage_of(scenario)
+    robot, start = stage.robot, stage.start
     views: list[View] = []
-    for index, item in enumerate(scenario.obstacles):
-        name = item.name or f"obstacle{index}"
-        things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
-        objects += things
+    for index, (item, things) in enumerate(zip(scenario.obstacles, stage.solids, strict=True)):
         warn_of(item, things[0], f"{scenario.name}: obstacles[{index}]")
         for thing in things:
             look = partial(view_of, item, thing, bare=scenario.method == "custom")
             views.append(_at(f"obstacles[{index}]", scenario, look))
-    _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
     seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
     written = scenario.method == "custom"
@@ -136,9 +168,9 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         body=body,
         mover=mover,
         driver=driver,
-        objects=tuple(objects),
+        objects=stage.objects,
         start=start,
-        start_velocity=velocity,
+        start_velocity=stage.start_velocity,
         posture=posture,
         seen=seen,
         pose=pose,

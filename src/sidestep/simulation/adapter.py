@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Controller
+from sidestep.loop import ModelLoop
 from sidestep.obstacles.scene import Seen
 from sidestep.simulation.run import status_name
 
@@ -58,7 +59,7 @@ class KinematicAdapter(Protocol):
 
 
 class ControllerAdapter:
-    """A `Controller`, told what it sees.
+    """A `Controller` in the loop of a model (`sidestep.loop.ModelLoop`), told what it sees.
 
     Args:
         controller: with its goal set.
@@ -67,7 +68,7 @@ class ControllerAdapter:
     """
 
     def __init__(self, controller: Controller, obstacles: Seen | Callable[[float], Seen | None]) -> None:
-        self.controller = controller
+        self.controller, self._loop = controller, ModelLoop(controller)
         self._period = controller.settings.period
         # A simulation may take longer than real time: it tells its own, which goes on from that of one before.
         self._time = None if controller.settings.synchronous else clock.monotonic()
@@ -90,9 +91,9 @@ class ControllerAdapter:
         if self._time is not None:
             self._time += self._period
         if self.controller.has_torque and mass_matrix is not None:
-            command = self.controller.step(q, v, mass_matrix, bias, time=self._time)
+            command = self._loop.cycle(q, v, mass_matrix, bias, time=self._time)
         else:
-            command = self.controller.step(q, v, time=self._time)
+            command = self._loop.cycle(q, v, time=self._time)
         return StepRecord(
             torque=command.torque,
             acceleration=command.acceleration,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +13,7 @@ from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
 from sidestep.simulation.adapter import Adapter
 from sidestep.simulation.model import build_model
+from sidestep.simulation.physics import Physics
 from sidestep.simulation.pose_target import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
 
@@ -61,10 +61,6 @@ class Simulation:
             joint_friction=joint_friction,
             visuals=visuals,
         )
-        ids = self.built.model.body_mocapid[list(self.built.object_bodies)]
-        self._moving = [
-            (item, mocap) for item, mocap in zip(self.objects, ids, strict=True) if item.motion == "moving"
-        ]
 
     def run(
         self,
@@ -98,9 +94,9 @@ class Simulation:
         start = self.robot.check_configuration(start, "start")
         if not isinstance(goal, PoseTarget):
             goal = self.robot.check_configuration(goal, "goal")
-        built, data = self.built, mujoco.MjData(self.built.model)
-        built.set_state(
-            data,
+        built = self.built
+        physics = Physics(built, self.objects, period=self.timestep, substeps=self.substeps)
+        physics.begin(
             start,
             np.zeros_like(start) if start_velocity is None else real_array(start_velocity, "start_velocity"),
         )
@@ -109,29 +105,13 @@ class Simulation:
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         contacts: list[Contact] = []
         arrived = False
-        diverged = data.warning[mujoco.mjtWarning.mjWARN_BADQACC]
-        mujoco.mj_kinematics(built.model, data)
-        poses = built.object_poses(data)  # of objects at rest, for good
-        at_rest = all(item.motion == "fixed" for item in self.objects)
         for k in range(steps):
             time = k * self.timestep
-            self._drive(data, time)
-            mujoco.mj_step1(built.model, data)
-            q, v = built.state(data)
-            step = driver.drive(time, q, v, built.mass_matrix(data), built.bias(data))
-            poses = poses if at_rest else built.object_poses(data)
-            data.ctrl[built.actuators] = step.torque
-            for substep in range(self.substeps):
-                if substep > 0:
-                    self._drive(data, time + substep * self.timestep / self.substeps)
-                    mujoco.mj_step1(built.model, data)
-                mujoco.mj_step2(built.model, data)
-                contacts.extend(self._contacts(data, time))
-            _, v_next = built.state(data)
-            if diverged.number or not np.isfinite(v_next).all():
-                raise RuntimeError(
-                    f"the physics diverged at {time:.3f} s; shorten the timestep or add substeps"
-                )
+            q, v = physics.measure(time)
+            step = driver.drive(time, q, v, built.mass_matrix(physics.data), built.bias(physics.data))
+            poses = physics.object_poses()
+            v_next, touched = physics.advance(step.torque, time)
+            contacts.extend(touched)
             row = (
                 time,
                 q,
@@ -167,25 +147,6 @@ class Simulation:
             controller_status=tuple(rows.pop("controller_status")),
             **{name: np.array(column, dtype=float) for name, column in rows.items()},
         )
-
-    def _drive(self, data: mujoco.MjData, time: float) -> None:
-        """Puts the moving objects where their script says."""
-        for item, mocap in self._moving:
-            data.mocap_pos[mocap] = item.pose_at(time)[:3, 3]
-
-    def _contacts(self, data: mujoco.MjData, time: float) -> list[Contact]:
-        found = []
-        wrench = np.zeros(6)
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            owners = [self.built.geom_owner[int(g)] for g in contact.geom]
-            links = [name for role, name in owners if role == "link"]
-            if not links or contact.dist > 0.0:
-                continue
-            obstacle = next(name for role, name in owners if role != "link")
-            mujoco.mj_contactForce(self.built.model, data, index, wrench)
-            found.append(Contact(time, links[0], obstacle, float(-contact.dist), float(wrench[0])))
-        return found
 
 
 _COLUMNS = (

@@ -20,6 +20,7 @@ from sidestep._core import (
     SafetyStatus,
 )
 from sidestep.arm import Arm
+from sidestep.loop import ModelLoop
 from sidestep.robot import Robot
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
@@ -97,6 +98,7 @@ class ControllerAdapter:
     def __init__(self, robot: Robot, arm: Arm, settings: ControllerSettings, tip: str) -> None:
         self._robot, self._arm, self._settings, self._tip = robot, arm, settings, tip
         self._controller = Controller(arm, settings)
+        self._loop = ModelLoop(self._controller)
         self._time = 0.0  # [s] that the simulation has run
         self._told: Obstacles | None = None
         self._said: Controller | None = None  # took the last step
@@ -145,7 +147,7 @@ class ControllerAdapter:
             self._told = obstacles
         self._said, self._seen, self._q = self._controller, obstacles, q
         self._time += self._settings.period  # that of the simulation, which may be slower than real time
-        return self._controller.step(q, v, mass_matrix, bias, time=self._time).torque
+        return self._loop.cycle(q, v, mass_matrix, bias, time=self._time).torque
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
         """Takes a step without time passing: of another controller, that does not plan ahead."""

@@ -209,6 +209,7 @@ class Snapshot:
         torque_share, speed_share: largest of a joint over its limit.
         contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
         timing: of the steps. rows: of a recording since the last snapshot. camera: what a depth camera sees.
+        attached: another program moves the arm; running then is whether the page follows it.
     """
 
     scenario: Scenario
@@ -248,6 +249,7 @@ class Snapshot:
     recording: bool
     camera: CameraState
     rows: tuple[Row, ...] = ()
+    attached: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,7 @@ from sidestep.studio import messages as m
 from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.prepared_bodies import in_words
 from sidestep.studio.process_link import connect_to_parent, start_process
+from sidestep.studio.served_session import ServedSession
 from sidestep.studio.session import Session
 from sidestep.studio.systems import Covering, Recipe, draft_arm, make_body
 
@@ -46,14 +47,26 @@ SWITCH = 2e-4  # [s] for which another thread of the process, as that of a camer
 
 
 @dataclass(frozen=True)
+class Served:
+    """An arm that another program serves: see `sidestep.connect`."""
+
+    address: str | None = None
+    token: str | None = None
+
+
+@dataclass(frozen=True)
 class Beginning:
-    """What a loop starts with: see `Session`; ellipsoids: of a covering body per link, None: as it finds best."""
+    """What a loop starts with: see `Session`; ellipsoids: of a covering body per link, None: as it finds best.
+
+    served: the arm of another program, in place of a simulation.
+    """
 
     scenario: Scenario
     method: str
     numbers: Mapping[str, Mapping[str, Any]]
     ellipsoids: int | None = None
     goals: tuple[Array, ...] = ()
+    served: Served | None = None
 
 
 class SessionProcess:
@@ -156,16 +169,20 @@ def serve(connection: Connection[Any, Any]) -> None:
         return draft_arm(scenario, progress)
 
     connection.send(m.Preparing("loading robot and scene"))
+    session: Session | ServedSession
     try:
-        session = Session(
-            beginning.scenario,
-            method=beginning.method,
-            numbers=beginning.numbers,
-            goals=beginning.goals,
-            ellipsoids=beginning.ellipsoids,
-            prepare=prepare,
-            draft=draft,
-        )
+        if beginning.served is not None:
+            session = ServedSession(beginning.scenario, beginning.served.address, beginning.served.token)
+        else:
+            session = Session(
+                beginning.scenario,
+                method=beginning.method,
+                numbers=beginning.numbers,
+                goals=beginning.goals,
+                ellipsoids=beginning.ellipsoids,
+                prepare=prepare,
+                draft=draft,
+            )
     except (ValueError, OSError, MissingExtraError) as error:
         connection.send(m.Failed(str(error), fatal=True))
         return
@@ -181,7 +198,7 @@ def serve(connection: Connection[Any, Any]) -> None:
 class _Pacer:
     """Keeps simulated time with the clock, answers commands between steps, and sends snapshots."""
 
-    def __init__(self, session: Session, connection: Connection[Any, Any]) -> None:
+    def __init__(self, session: Session | ServedSession, connection: Connection[Any, Any]) -> None:
         self._session, self._connection = session, connection
         self._unseen = 0
         self._sent, self._next_frame = -FRAME, 0.0

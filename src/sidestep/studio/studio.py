@@ -14,7 +14,7 @@ from sidestep.studio import messages as m
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor
 from sidestep.studio.gallery import ends_of
 from sidestep.studio.server import HOST, address_of, check_port, guarded_server
-from sidestep.studio.session_process import Beginning, SessionProcess
+from sidestep.studio.session_process import Beginning, Served, SessionProcess
 
 if TYPE_CHECKING:
     from sidestep.studio.page.view import View
@@ -40,6 +40,7 @@ class Studio:
         method: one of `sidestep.studio.methods.METHODS`. numbers: parameters of methods, by method and name.
         host, port: where to listen; by default this machine alone can connect.
         ellipsoids: per link of a covering body; None: as `Body.cover` finds best, which takes longer.
+        served: an arm that another program serves, in place of a simulation; the scenario says what it looks like.
 
     Raises:
         OSError: the port is taken, or the address is not one of this machine.
@@ -58,6 +59,7 @@ class Studio:
         host: str = HOST,
         port: int = PORT,
         ellipsoids: int | None = None,
+        served: Served | None = None,
     ) -> None:
         from sidestep.studio.methods import method_named
 
@@ -74,7 +76,9 @@ class Studio:
         self.snapshot: m.Snapshot | None = None
         self.error = ""
         goals = ends_of(scenario, robot) if to_and_fro else ()
-        self._loop = SessionProcess(Beginning(scenario, method, dict(numbers or {}), ellipsoids, goals))
+        self._loop = SessionProcess(
+            Beginning(scenario, method, dict(numbers or {}), ellipsoids, goals, served)
+        )
         self.view: View = View(server, scenario, robot, self.send)
         self._truth = ExactClearanceMonitor(self.view.take_clearances, self.view.loop.report)
         self._last_truth = 0.0

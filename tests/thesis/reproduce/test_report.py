@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 EXPECTED = {
     *(f"figure-{key}" for key in ("2.1", "3.1", "3.2", "3.3", "3.4", "3.5", "3.7")),
     *(f"figure-5.{n}" for n in (1, 3, 4, 5, 6, 7, 8, 9)),
-    *(f"figure-6.{n}" for n in (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14)),
+    *(f"figure-6.{n}" for n in (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14)),
     *("figure-A.1", "figure-B.1", "figure-B.2"),
     *(
         f"table-{key}"
@@ -129,18 +129,19 @@ def test_criteria_of_the_simulated_scenarios(report):
     )  # with correct derivatives the thesis's switch does not arrive here
 
 
-def test_ways_of_table_6_1_are_orders_of_magnitude_apart(report):
-    found = data(report, "table-6.1")
-    dense, python, native = (
-        found[f"{method} [Hz]"] for method in ("analytic, dense", "core from Python", "core in C++")
-    )
-    # Measured more than a thousand times apart: a busy machine cannot bring them to twenty.
-    assert np.all(python > 20.0 * dense)
-    assert np.all(native > 20.0 * dense)
+def test_table_6_1_measures_every_way(report):
+    table = report.items["table-6.1"]
+    found = {method: table.data[f"{method} [Hz]"] for method in performance.METHODS}
     if not torch_autograd.available():
-        assert "not installed" in report.items["table-6.1"].rows[0][1]
-        pytest.skip("PyTorch is not installed, so its row has no figures to compare")
-    assert np.all(found["torch.autograd [Hz]"] < dense)
+        assert "not installed" in table.rows[0][1]
+        del found["torch.autograd"]
+    for method, frequencies in found.items():
+        assert np.all((frequencies > 0.0) & np.isfinite(frequencies)), method
+    # How far apart the ways are is the table's to say: a test that compares times fails on a busy machine.
+    ratios = dict(zip(performance.METHODS, (row[4] for row in table.rows), strict=True))
+    assert ratios["analytic, dense"] == "1 / 1 / 1"
+    native = [float(ratio.replace(",", "")) for ratio in ratios["core in C++"].split(" / ")]
+    np.testing.assert_allclose(native, found["core in C++"] / found["analytic, dense"], rtol=0.01)
 
 
 def test_projections_have_a_stated_spread(report):

@@ -28,7 +28,7 @@ enum class SafetyStatus {
 enum class Activity {
   no_goal,  ///< no goal, or the commanded velocity is too old: the arm comes to rest, and avoids moving obstacles
   moving,   ///< on the way to its goal, or following a velocity, twist or trajectory
-  waiting,  ///< waiting until a posture is found, its trajectory is free, or after a touch for `restart`
+  waiting,  ///< waiting until a posture is found, its trajectory is free, after a touch for `restart`, or paused for `resume`
   arrived,  ///< the goal is reached
   blocked,  ///< no path leads to the goal, for at least 0.2 s, see `explain`; the arm goes as near as it can
   stale,    ///< as SafetyStatus::stale: the arm stops

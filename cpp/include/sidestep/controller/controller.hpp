@@ -117,6 +117,17 @@ class Controller {
   /// reference, or at the first one that disagrees after more than 0.1 s without a step, by the time that is told or the machine's clock. Until then the reference comes to rest,
   /// and the status is `tracking_lost`.
   void restart() noexcept { restarts_.store(true, std::memory_order_release); }
+  /// What the arm's drives say that they go on from (nv each), for outputs of positions: the reference of the next step begins there,
+  /// and its jerk is counted from that acceleration. Call it where a command did not reach them and they have gone on by themselves.
+  /// Numbers that are not finite, and other outputs, change nothing: a sum of velocities that drives have been told is not where the arm
+  /// is. For the thread of `step`, before it; no allocation.
+  void continue_from(ConstVectorRef position, ConstVectorRef velocity, ConstVectorRef acceleration) noexcept;
+  /// The arm comes to rest within its limits and clearances, and stays there until `resume`; its goal or request is kept. The activity
+  /// is `waiting` then. From any thread; waits for nobody.
+  void pause() noexcept { paused_.store(true, std::memory_order_release); }
+  /// Goes on to the goal after `pause`.
+  void resume() noexcept { paused_.store(false, std::memory_order_release); }
+  bool is_paused() const noexcept { return paused_.load(std::memory_order_acquire); }
 
   // What each source of obstacles says, from the next step on. Until anything was set the arm stays where it is. All of these throw
   // std::invalid_argument that names the value and what is allowed; then nothing changes.
@@ -186,6 +197,14 @@ class Controller {
   /// Ends the recording, and says what it holds. Throws std::runtime_error where nothing is recorded, std::system_error where
   /// writing failed.
   RecordingSummary stop_recording();
+  /// Keeps the last seconds on disk from now on, whatever comes: files of a third of `seconds` each in a folder that is made if need be,
+  /// of which the oldest are deleted, so that between 1 and 4/3 times `seconds` are there. The folder is kept near `most_bytes`: where they
+  /// are reached, less than `seconds` are there, and the file being written comes on top. For reports, see recorded_run.hpp: what begins in
+  /// the middle of a motion cannot be replayed. From any thread, at any time, beside a recording; costs steps as much. Throws
+  /// std::runtime_error where it is on, std::invalid_argument, std::system_error.
+  void black_box(const std::filesystem::path& folder, double seconds = 30.0, std::uint64_t most_bytes = black_box_bytes);
+  /// Ends it; the files stay. From any thread. Throws std::runtime_error where it is not on.
+  BlackBoxSummary stop_black_box();
 
   /// The command of the last step; always the same object.
   const Command& command() const noexcept { return command_; }
@@ -253,12 +272,19 @@ class Controller {
   const ControllerSettings settings_;
   Command command_;
   const Command refused_;  // Command for a thread that steps while another one does.
+  /// What the drives go on from.
+  struct Told {
+    bool is = false;
+    Eigen::VectorXd position, velocity, acceleration;
+  };
+  Told told_;  // by continue_from, until the next step
   SingleStepper stepper_;
   std::unique_ptr<SourceRegistry> registry_;  // guarded by setters_
   std::unique_ptr<Impl> impl_;                // Used by the thread of `step`.
   std::atomic<Impl*> next_{nullptr};          // which it takes over in the next step
   std::atomic<Impl*> retired_{nullptr};       // those before, for another thread to destroy
   std::atomic<bool> restarts_{false};         // The next step restarts.
+  std::atomic<bool> paused_{false};           // From the next step on the arm rests.
   mutable std::mutex setters_;
   Impl* newest_;                // Newest of those that step, which setters tell.
   Impl* lifted_ = nullptr;      // the one that newest_ goes over to, which they tell too
@@ -268,7 +294,9 @@ class Controller {
   bool has_torque_;
   std::uint64_t arm_count_ = 0;  // Number of arms after the first.
   std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<Recorder> box_;            // guarded by setters_
   std::atomic<Recorder*> records_{nullptr};  // Used by the thread of `step`; null once the recording has ended.
+  std::atomic<Recorder*> boxes_{nullptr};    // the same of the black box
   std::atomic<bool> in_use_{false};
   StateHistory history_;
   std::atomic<double> time_{0.0}, offset_{0.0};  // own time of the last step, and what it is more than the caller's [s]

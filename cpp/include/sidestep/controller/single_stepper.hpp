@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <thread>
 
 namespace sidestep {
@@ -11,7 +13,7 @@ class SingleStepper {
  public:
   /// Begins a step. False where another thread is inside one: then this one must not touch the controller.
   bool enter() noexcept {
-    if (inside_.exchange(true, std::memory_order_acquire)) {
+    if (inside_.exchange(true)) {
       return false;
     }
     const std::thread::id now = std::this_thread::get_id();
@@ -27,7 +29,17 @@ class SingleStepper {
     return true;
   }
   /// Ends the step of the thread that is inside.
-  void leave() noexcept { inside_.store(false, std::memory_order_release); }
+  void leave() noexcept {
+    turns_.store(turns_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    inside_.store(false, std::memory_order_release);
+  }
+  /// Waits, in another thread, until a step that is being made has ended: what was taken from the steps before is then unused.
+  void wait_until_left() const noexcept {
+    const std::uint64_t turn = turns_.load();
+    while (inside_.load() && turns_.load() == turn) {
+      std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
+  }
   /// Whether the last step came from another thread than the one before, and that again and again: two loops that share a
   /// controller, each with a state of its own. Handing a loop over to another thread is none.
   bool in_turn() const noexcept { return in_turn_.load(std::memory_order_relaxed); }
@@ -37,6 +49,7 @@ class SingleStepper {
   static constexpr int most_changes = 2;  // Changes of the thread: to another one, and back.
 
   std::atomic<bool> inside_{false};
+  std::atomic<std::uint64_t> turns_{0};  // steps so far
   std::thread::id last_;
   int changes_ = 0, same_ = 0;
   std::atomic<bool> in_turn_{false};

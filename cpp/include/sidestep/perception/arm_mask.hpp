@@ -42,8 +42,8 @@ class ArmMask {
   /// Throws std::invalid_argument where the body is not calibrated.
   ArmMask(const Robot& robot, const Body& body);
 
-  /// Marks the pixels of `image` that show the arm. `before` and `after`: earlier and later than `now` by as much as the clock of the image may be
-  /// wrong. No allocation.
+  /// Marks the pixels of `image` that show the arm, and those that fly at its silhouette. `before` and `after`: earlier and later than `now`
+  /// by as much as the clock of the image may be wrong. No allocation.
   void mark(const DepthCamera& camera, const CameraRays& rays, const ArmInView& before, const ArmInView& now,
             const ArmInView& after, DepthImage& image) noexcept;
 

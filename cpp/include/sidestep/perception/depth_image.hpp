@@ -31,7 +31,8 @@ struct RawDepth {
 /// An image of depths that were checked, and what its pixels show.
 ///
 /// A pixel is flying where at least one of its eight neighbours has another depth and fewer than two have its own, but for noise and
-/// slope: |z - z'| <= 4 σ(z) + 0.03 z. One whose neighbours show nothing is none.
+/// slope: |z - z'| <= 4 σ(z) + 0.03 z. One whose neighbours show nothing is none. Flying pixels beside the arm may support each other; see
+/// `mark_edges_of_arm`.
 class DepthImage {
  public:
   explicit DepthImage(const DepthCamera& camera);
@@ -40,6 +41,12 @@ class DepthImage {
   void take(const DepthCamera& camera, const RawDepth& raw);
   /// The same of points (3 × N) in the optical frame: each pixel takes the nearest.
   void take(const DepthCamera& camera, const Eigen::Ref<const Eigen::Matrix3Xd>& points);
+
+  /// Marks flying pixels at the silhouette of the arm, once its pixels are marked.
+  ///
+  /// Within two pixels of them, an obstacle is flying where its depth is between that of the arm and that of another surface there:
+  /// farther than one by 4 σ(z), nearer than the other by 4 σ(z), and by 0.03 z more where that one is not the arm. No allocation.
+  void mark_edges_of_arm(const DepthCamera& camera) noexcept;
 
   int width() const noexcept { return width_; }
   int height() const noexcept { return height_; }
@@ -52,11 +59,16 @@ class DepthImage {
 
  private:
   void mark_edges(const DepthCamera& camera) noexcept;
+  /// Finds the obstacles of a row that are within two pixels of the arm; false: the arm is not near.
+  bool find_beside_arm(int row) noexcept;
+  bool is_between(int u, int v, float noise, float slope) const noexcept;
 
   int width_, height_;
   std::vector<float> depth_;
   // Of one row: difference of depths on one surface [m], number of neighbours on it, and of those on another one.
   std::vector<float> tolerance_, support_, others_;
+  // Of one row: 1 in columns where the arm is within two rows, with two columns more at either end, and at obstacles beside it.
+  std::vector<unsigned char> arm_in_column_, beside_arm_;
   std::vector<PixelLabel> labels_;
 };
 

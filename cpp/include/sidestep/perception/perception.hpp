@@ -25,7 +25,7 @@ struct Capture {
 
 /// What became of an image, and what it cost.
 struct PerceptionReport {
-  bool used = false;  ///< false: nobody knows where the arm was at the time of capture; obstacles are as before
+  bool used = false;  ///< false: obstacles are as before, and the question says why
   int obstacle_pixels = 0, arm_pixels = 0, edge_pixels = 0;
   int seen = 0;          ///< number of obstacles that this camera shows now
   int remembered = 0;    ///< number of those that no camera shows now
@@ -69,14 +69,16 @@ class Perception {
   void forget();
 
   const std::vector<DepthCamera>& cameras() const noexcept { return cameras_; }
+  /// That of a name. Throws std::invalid_argument for a name that no camera has.
+  const DepthCamera& camera(const std::string& name) const;
   const PerceptionSettings& settings() const noexcept { return settings_; }
-  /// Pose X_WC of a camera at its last image; where it is mounted before the first.
+  /// Pose X_WC of a camera at its last image, used or not; where it is mounted before the first.
   Eigen::Isometry3d pose(const std::string& camera) const;
   /// The last image of a camera, checked: depth [m], 0 where nothing was seen.
   std::vector<float> depth(const std::string& camera) const;
-  /// What its pixels show.
+  /// What its pixels show, also of an image that was not used.
   std::vector<PixelLabel> labels(const std::string& camera) const;
-  /// Time of its last image [s]; NaN before the first.
+  /// Time of its last image that was used [s]; NaN before the first.
   double time(const std::string& camera) const;
 
   /// An obstacle as it was handed to the controller.

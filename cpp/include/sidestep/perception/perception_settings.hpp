@@ -14,6 +14,7 @@ struct PerceptionSettings {
   double memory = 30.0;
   int clear_after = 2;
   int least_pixels = 3;
+  int steady_images = 8;
   bool unseen_is_free = true;
   double valid_for = 0.25;
 

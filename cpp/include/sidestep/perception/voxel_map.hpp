@@ -46,13 +46,14 @@ struct SeenImage {
   const CameraRays& rays;
   const Eigen::Isometry3d& X_WC;
   const DepthImage& image;
+  const float* depth;      ///< per pixel [m]: of the image, or with less noise
   const float* arm_front;  ///< Depth from which on the arm hides what is behind, per pixel [m].
   std::uint8_t number;     ///< of the camera
   double time;             ///< of capture [s]
 
   /// Depth up to which a pixel sees [m], of one that shows something: the arm is hidden where it begins.
   double sees_to(std::size_t pixel) const noexcept {
-    const float depth = image.labels()[pixel] == PixelLabel::arm ? arm_front[pixel] : image.depth()[pixel];
+    const float depth = image.labels()[pixel] == PixelLabel::arm ? arm_front[pixel] : this->depth[pixel];
     return std::min(static_cast<double>(depth), camera.far);
   }
 };

@@ -41,6 +41,8 @@ class PointTree {
   /// The same in an order of the points that is given.
   PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
             std::vector<int> order);
+  /// The same points with other velocities.
+  PointTree moving(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities) const;
   /// One tree over the points of several, each a part; none of a node's leaves belongs to another part. Points are numbered on from
   /// tree to tree. Sorts nothing again.
   static PointTree join(const std::vector<const PointTree*>& trees);
@@ -52,6 +54,8 @@ class PointTree {
   double fastest() const noexcept { return fastest_; }              ///< speed of any point [m/s], at most
   /// Number of the point at each place of the tree; -1: none, which fills up a leaf.
   const std::vector<int>& order() const noexcept { return order_; }
+  /// Whether a tree that is made of its points and velocities as they are now has this order; false where that is not known.
+  bool is_in_usual_order() const noexcept { return in_usual_order_; }
 
   /// Coordinates [m], radii [m] and velocities [m/s] in tree order; points that fill up the last leaf lie at `padding`.
   const double* coordinate(int axis) const noexcept { return columns_[static_cast<std::size_t>(axis)].data(); }
@@ -217,6 +221,7 @@ class PointTree {
   std::array<std::vector<double>, num_columns> columns_;  // Columns x, y, z, radius, velocity.
   std::vector<Level> levels_;                             // Levels of the tree: leaves first, one node last.
   double fastest_ = 0.0, common_radius_ = -1.0;
+  bool in_usual_order_ = false;
 };
 
 }  // namespace sidestep

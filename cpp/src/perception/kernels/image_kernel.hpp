@@ -22,6 +22,16 @@ struct CellCube {
   int side, begin;
 };
 
+/// When a pixel rests, see SteadyDepth. A depth z has the noise sigma = constant + quadratic z².
+struct SteadyRule {
+  float constant, quadratic;
+  float jump;           ///< difference from the mean [sigma] that is another surface
+  float drift;          ///< lasting difference [sigma] that is a surface that moves
+  float most;           ///< images over which a mean is taken
+  float least;          ///< images without a jump or a drift after which a pixel rests
+  unsigned char shows;  ///< label of the pixels that have a mean
+};
+
 struct ImageKernel {
   /// Lowers `front` to the depth at which rays enter the ellipsoid, and sets `arm` to 1 where z is inside but for noise.
   void (*mark)(const RayEllipsoid& ellipsoid, const float* x, const float* y, const float* z, int count, float* front,
@@ -33,6 +43,10 @@ struct ImageKernel {
   void (*cells)(const CellCube& cube, const float* x, const float* y, const float* z, int count, int* cells);
   /// Adds 1 to `support` where a neighbour has the same depth within the tolerance, else to `others` where it has one.
   void (*compare)(const float* z, const float* neighbour, const float* tolerance, int count, float* support, float* others);
+  /// Takes depths into the means of their pixels: over `images`, with lasting differences `drift` [sigma]. `steady`: the mean of those that
+  /// rest, else the depth.
+  void (*steady)(const SteadyRule& rule, const float* z, const unsigned char* label, int count, float* mean, float* images,
+                 float* drift, float* steady);
 };
 
 ImageKernel image_kernel_baseline() noexcept;

@@ -54,7 +54,26 @@ void compare(const float* __restrict__ z, const float* __restrict__ neighbour, c
   }
 }
 
-constexpr ImageKernel image_kernel{&mark, &place, &cells, &compare};
+void steady(const SteadyRule& rule, const float* __restrict__ z, const unsigned char* __restrict__ label, int count,
+            float* __restrict__ mean, float* __restrict__ images, float* __restrict__ drift, float* __restrict__ steady) {
+  constexpr float share = 0.25f;  // of the newest image in the lasting difference: about seven images
+  const SteadyRule s = rule;
+  for (int u = 0; u < count; ++u) {
+    const float noise = s.constant + s.quadratic * z[u] * z[u], away = z[u] - mean[u];
+    const float lasting = drift[u] + share * (away / noise - drift[u]);
+    const bool shows = label[u] == s.shows;
+    const bool is_new = !shows | (images[u] == 0.0f) | (__builtin_fabsf(away) > s.jump * noise);
+    const bool moves = __builtin_fabsf(lasting) > s.drift;
+    const float next = images[u] + 1.0f, capped = next < s.most ? next : s.most;
+    const float all = is_new ? 1.0f : moves ? 2.0f : capped;
+    mean[u] = is_new ? z[u] : mean[u] + away / all;
+    drift[u] = is_new | moves ? 0.0f : lasting;
+    images[u] = shows ? all : 0.0f;
+    steady[u] = all >= s.least ? mean[u] : z[u];
+  }
+}
+
+constexpr ImageKernel image_kernel{&mark, &place, &cells, &compare, &steady};
 
 }  // namespace
 }  // namespace sidestep::kernels

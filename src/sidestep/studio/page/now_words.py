@@ -43,6 +43,8 @@ class NowWords:
         )
         status = [f"status: {snapshot.status}"] if snapshot.status else []
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
+        if snapshot.attached:
+            speed = "another program moves it" if snapshot.running else "not followed until Run or Restart"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
         coarse = (
             [f"coarse body; the fine one is made: {html.escape(snapshot.refining)}"] if snapshot.draft else []
@@ -51,9 +53,10 @@ class NowWords:
         facts = [*clearances.facts(snapshot.things, least), state, *status, *coarse]
         self._tell(now, begun(snapshot.words), facts, snapshot.events)
 
-    def show_replay(self, now: float, row: m.Row, clearances: Clearances) -> None:
+    def show_replay(self, now: float, row: m.Row, clearances: Clearances, *, attached: bool) -> None:
         """Says which moment of the recording is shown."""
-        facts = [*clearances.facts(row.things), "the loop is paused"]
+        meanwhile = "the arm itself goes on" if attached else "the loop is paused"
+        facts = [*clearances.facts(row.things), meanwhile]
         self._tell(now, f"Replay of {row.time:.2f} s", facts)
 
     def _tell(

@@ -44,8 +44,9 @@ class Recorder:
         self.state: Any = gui.add_markdown("nothing recorded")
         add_note(
             gui,
-            "200 states a second; Restart and loading end a recording. Play shows it while the loop is paused; Live "
-            "shows the loop, which goes on if it ran. The download is NumPy's .npz: time [s], q [rad | m], "
+            "200 states a second (60 of an arm that another program moves); Restart and loading end a recording. Play "
+            "shows it while the loop is paused, Live the loop, which goes on if it ran; an arm that another program "
+            "moves goes on meanwhile. The download is NumPy's .npz: time [s], q [rad | m], "
             "poses and names of obstacles.",
         )
 
@@ -101,17 +102,22 @@ class Recorder:
         self.rows, self.plotted, self._of_this_arm = [], [], True
         self.show_live()
 
+    def _set_running(self, running: bool) -> None:
+        """Of a simulation; an arm that another program moves goes on as it does, and nobody takes the command."""
+        if self._loop.last is not None and not self._loop.last.attached:
+            self._loop.send(m.SetRunning(running))
+
     def _on_record(self, event: Any) -> None:
         recording = event.target.value == "Record"
         if recording:
             self._begin()
-            self._loop.send(m.SetRunning(True))
+            self._set_running(True)
         self._loop.send(m.SetRecording(recording))
 
     def _on_replay(self, event: Any) -> None:
         if event.target.value == "Live":
             if self._replaying and self._ran:
-                self._loop.send(m.SetRunning(True))
+                self._set_running(True)
             self.show_live()
             return
         with self._loop.telling(event.client):
@@ -122,7 +128,7 @@ class Recorder:
             if not self._replaying:
                 self._ran = self._loop.last is not None and self._loop.last.running
             self._loop.send(m.SetRecording(False))
-            self._loop.send(m.SetRunning(False))
+            self._set_running(False)
             self._slider.max = max(round(self.length, 2), 0.01)
             self._slider.disabled = False
             self._replaying, self._since = True, clock.monotonic()

@@ -131,7 +131,7 @@ class View:
                 way = [past.q for past in self.recorder.rows[: index + 1]]
                 self.marks.show_way(way, visible=self.switches.trail.value)
                 self.plots.draw_past(now, self.recorder.plotted, row.time)
-                self.words.show_replay(now, row, self.clearances)
+                self.words.show_replay(now, row, self.clearances, attached=snapshot.attached)
             self.shown = row.time, self.clearances.time
             return row
 

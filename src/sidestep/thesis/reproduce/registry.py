@@ -81,6 +81,7 @@ PARTS: tuple[Part, ...] = (
         "switches",
         ("6.1", "6.2", "6.3", "6.4", "6.5", "6.6", "6.7", "6.8", "B.1", "B.2", "6.1-switches"),
     ),
+    Part("6.9", "Two programs", _SIX, "two_programs", "two_programs", ("6.9",)),
     Part(
         "6.2",
         "Torque control in MuJoCo",

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "sidestep/perception/depth_camera.hpp"
+#include "sidestep/perception/depth_image.hpp"
+
+namespace sidestep {
+
+/// Depths of a camera that stands still, with less noise: each pixel that shows an obstacle has the mean m of its last images.
+///
+/// m <- m + (z - m)/n, with n the number of images, at most the most. Another surface, |z - m| > 4 sigma(z), begins a new mean (n = 1). A
+/// depth that stays on one side of the mean, by 1.2 sigma over about seven images, is a surface that moves: m goes half of the way (n = 2).
+/// Before n = 5 the depth itself counts. So a surface that moves by 1 sigma or more from image to image is not averaged, and a slower one
+/// is shown less than 2 sigma behind where it is.
+class SteadyDepth {
+ public:
+  SteadyDepth(const DepthCamera& camera, int most_images);
+
+  /// Takes an image over. No allocation.
+  void add(const DepthCamera& camera, const DepthImage& image) noexcept;
+  void forget() noexcept;
+  const float* depth() const noexcept { return steady_.data(); }  ///< [m], of the pixels of the last image
+
+ private:
+  float most_;
+  std::vector<float> mean_, images_, drift_, steady_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,97 @@
+// Means of depths over time: less noise where nothing moves, and never far behind what does.
+#include "sidestep/perception/steady_depth.hpp"
+
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "support/allocations.hpp"
+#include "support/depth_scene.hpp"
+
+using namespace sidestep;
+
+constexpr double noise = 0.01;  // [m]
+
+// Not in a namespace without a name: test cases derive from it.
+/// A camera in front of a wall, whose distance is a function of the number of the image.
+struct Watching {
+  DepthCamera camera = test::small_camera({0.0, 0.0, 0.0}, {1.0, 0.0, 0.0});
+  DepthImage image{camera};
+  SteadyDepth steady{camera, 8};
+  std::mt19937 random{5};
+  double off = 0.0, spread = 0.0;  // of the means of the last image from the wall: mean and standard deviation [m]
+
+  Watching() { camera.noise = {noise, 0.0}; }
+  void look(double distance) {
+    std::normal_distribution<float> normal(static_cast<float>(distance), static_cast<float>(noise));
+    std::vector<float> pixels(160 * 120);
+    std::generate(pixels.begin(), pixels.end(), [&] { return normal(random); });
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    BOOST_TEST(test::allocations_of([&] { steady.add(camera, image); }) == 0u);
+    double sum = 0.0, squares = 0.0;
+    int num = 0;
+    for (std::size_t i = 0; i < image.size(); ++i) {
+      if (image.labels()[i] == PixelLabel::obstacle) {
+        const double away = static_cast<double>(steady.depth()[i]) - distance;
+        sum += away;
+        squares += away * away;
+        ++num;
+      }
+    }
+    BOOST_TEST_REQUIRE(num > 10000);
+    off = sum / num;
+    spread = std::sqrt(squares / num - off * off);
+  }
+};
+
+BOOST_FIXTURE_TEST_CASE(the_depth_of_what_rests_has_less_noise, Watching) {
+  look(1.0);
+  BOOST_TEST(spread > 0.9 * noise);
+  for (int n = 0; n < 20; ++n) {
+    look(1.0);
+  }
+  BOOST_TEST(spread < 0.45 * noise);
+  BOOST_TEST(std::abs(off) < 0.02 * noise);
+  steady.forget();
+  look(1.0);
+  BOOST_TEST(spread > 0.9 * noise);
+}
+
+BOOST_FIXTURE_TEST_CASE(another_surface_is_seen_at_once, Watching) {
+  for (int n = 0; n < 20; ++n) {
+    look(1.0);
+  }
+  look(0.9);
+  BOOST_TEST(std::abs(off) < 0.02 * noise);
+  look(1.2);
+  BOOST_TEST(std::abs(off) < 0.02 * noise);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_moves_is_never_far_ahead_of_its_depth, Watching) {
+  for (const double speed : {0.02, 0.1, 0.2, 0.5, 1.0}) {  // towards the camera [m/s]
+    steady.forget();
+    for (int n = 0; n < 20; ++n) {
+      look(2.0);
+    }
+    double most = 0.0, later = 0.0;  // later: once it is seen to move
+    for (int n = 1; n <= 40; ++n) {
+      look(2.0 - speed * n / 30.0);
+      most = std::max(most, std::abs(off));
+      later = n < 5 ? 0.0 : std::max(later, std::abs(off));
+    }
+    BOOST_TEST(most < 2.0 * noise, "at " << speed << " m/s it is " << most << " m behind");
+    if (speed / 30.0 >= noise) {
+      BOOST_TEST(later < 0.1 * noise, "at " << speed << " m/s it is " << later << " m behind");
+    }
+  }
+}
+
+BOOST_FIXTURE_TEST_CASE(without_noise_depths_stay_as_they_are, Watching) {
+  camera.noise = {0.0, 0.0};
+  look(1.0);
+  look(1.0);
+  BOOST_TEST(spread > 0.9 * noise);
+}

@@ -1,0 +1,5 @@
+"""Drivers: each connects a `Controller` to one kind of robot, for `sidestep.run`."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,11 @@
+from .core import Ideal as Ideal
+from .core import NativeDriver as NativeDriver
+from .core import RobotDescription as RobotDescription
+from .core import RobotState as RobotState
+from .core import RobotStopped as RobotStopped
+from .core import SimulatorDriver as SimulatorDriver
+from .franka import Franka as Franka
+from .franka_server import FrankaServer as FrankaServer
+from .mujoco import MuJoCo as MuJoCo
+from .replay import Replay as Replay
+from .ur import UR as UR

@@ -1,0 +1,9 @@
+from .connection import connect as connect
+from .core import Client as Client
+from .core import ClientInfo as ClientInfo
+from .core import ConnectionLost as ConnectionLost
+from .core import Cycle as Cycle
+from .core import Server as Server
+from .core import link_messages as link_messages
+from .core import link_version as link_version
+from .zenoh_bridge import ZenohBridge as ZenohBridge

@@ -1,0 +1,14 @@
+from .core import CycleObserver as CycleObserver
+from .core import Loop as Loop
+from .core import LoopSettings as LoopSettings
+from .core import ModelLoop as ModelLoop
+from .core import RunEnd as RunEnd
+from .core import RunReport as RunReport
+from .core import SupervisorSettings as SupervisorSettings
+from .core import clock_lateness as clock_lateness
+from .core import loop_settings_fields as loop_settings_fields
+from .core import supervisor_settings_fields as supervisor_settings_fields
+from .run import Arrived as Arrived
+from .run import arrived as arrived
+from .run import run as run
+from .supervisor import Supervisor as Supervisor
