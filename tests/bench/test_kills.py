@@ -34,6 +34,19 @@ def test_everything_must_hold() -> None:
         assert not replace(GOOD, **wrong).passed, wrong
 
 
+@pytest.mark.parametrize(
+    "said",
+    ["the loop was woken too late: the machine is too busy", "age of the state [s] 0.0506, allowed 0.05"],
+)
+def test_a_case_is_tried_again_only_where_a_busy_machine_came_first(said: str) -> None:
+    stopped = replace(GOOD, says_why=False)
+    assert stopped.was_disturbed(f"the run has ended (denied): {said}; the arm was not at rest")
+    assert replace(stopped, limits=False, error="RuntimeError: the arm did not move").was_disturbed(said)
+    assert not GOOD.was_disturbed(said)  # it says what has happened as well
+    assert not replace(stopped, limits=False).was_disturbed(said)  # a fault, whatever came first
+    assert not stopped.was_disturbed("the run has ended (arrived)")
+
+
 def braking(tmp_path: Path, fastest: float) -> Trial:
     """A trial whose simulator wrote a motion at that speed [rad/s] for 0.5 s, then 0.25 s of braking, then rest."""
     programs = Programs(tmp_path)

@@ -24,6 +24,15 @@ LONGEST_WAY = 40.0  # [s] to the goal
 SLACK = 1.02  # of limits: the simulated robot tracks with a small error
 ENCODERS = 1e-3  # [rad] beyond a position limit that is rounding
 NEAR = 0.02  # [rad] from the goal
+BUSY = (
+    "the machine is too busy",
+    "went without commands for too long",
+    "age of the state",
+)  # what a server says then
+
+
+class TrialError(RuntimeError):
+    """The case did not come about."""
 
 
 @dataclass
@@ -40,6 +49,7 @@ class KillOutcome:
         resumed: the arm was led to its goal afterwards.
         lost: time before the kill that the recording lacks [s]; None: nothing was recorded.
         error: what went wrong with the test itself.
+        busy: tries before this one, in which a busy machine had stopped the arm by itself.
     """
 
     case: str
@@ -53,6 +63,7 @@ class KillOutcome:
     resumed: bool = False
     lost: float | None = None
     error: str = ""
+    busy: int = 0
 
     @property
     def passed(self) -> bool:
@@ -60,6 +71,11 @@ class KillOutcome:
         stopped = self.rest is not None and self.rest < LONGEST_REST and self.limits
         recorded = self.lost is None or self.lost <= 1.0
         return stopped and self.says_why and self.resumed and recorded and not self.error
+
+    def was_disturbed(self, said: str) -> bool:
+        """Whether the arm stopped for a busy machine instead, within its limits; said: by the server."""
+        harmless = self.limits or bool(self.error)
+        return harmless and not self.says_why and any(words in said for words in BUSY)
 
 
 @dataclass
@@ -89,7 +105,7 @@ class Trial:
             return bool(np.abs(v).max() > MOVING)
 
         if not self.watcher.look(READY, fast):
-            raise RuntimeError("the arm did not move")
+            raise TrialError("the arm did not move")
         self.outcome.speed = float(np.abs(self.watcher.rows[-1][2]).max())
 
     def watch_rest(self, killed: float) -> None:
