@@ -34,6 +34,15 @@ def test_cameras_look_at_the_shoulder_from_their_azimuths(planar: Robot) -> None
         assert camera.far == pytest.approx(away + space.reach)
 
 
+def test_cameras_are_told_their_poses_are_exact_only_where_asked(planar: Robot) -> None:
+    default, exact = (
+        cameras_around(planar, RigSettings((0.0,), exact_poses=told))[0] for told in (False, True)
+    )
+    assert (default.translation_error, default.rotation_error) == (0.005, 0.005)
+    assert (exact.translation_error, exact.rotation_error) == (0.0, 0.0)
+    np.testing.assert_array_equal(exact.pose, default.pose)
+
+
 def test_the_room_is_out_of_reach() -> None:
     floor, front, *others = room(np.array([1.0, 0.0, 0.5]), 0.8)
     assert floor.pose[2, 3] + 0.05 == pytest.approx(0.5 - 1.4 * 0.8 + 0.05)

@@ -51,6 +51,7 @@ class RigSettings:
         azimuths: of the cameras around the vertical through the shoulder [rad]. size: of the images, of `SIZES`.
         rate: of the images [Hz]. latency: until they come [s]. lost: share of them that never come.
         noise: name of a noise model. unseen_is_free: see `PerceptionSettings`.
+        exact_poses: it is told that the poses of cameras, which are exact, are exact; else `DepthCamera`'s bounds.
 
     Raises:
         ValueError: an unknown size, no camera, or a number out of range.
@@ -63,6 +64,7 @@ class RigSettings:
     lost: float = 0.0
     noise: str = "d435"
     unseen_is_free: bool = True
+    exact_poses: bool = False
 
     def __post_init__(self) -> None:
         if self.size not in SIZES:
@@ -122,6 +124,8 @@ def cameras_around(
                 noise=DepthNoise(0.001, DISPARITY_ERROR / (focal * BASELINE)),
             )
         )
+    if settings.exact_poses:
+        cameras = [camera.replace(translation_error=0.0, rotation_error=0.0) for camera in cameras]
     return cameras
 
 

@@ -59,6 +59,7 @@ class CameraRunner:
     size: str
     noise: str
     unseen_is_free: bool
+    exact_poses: bool
     seed: int
 
     def move(self, problem: SceneProblem) -> Sighted:
@@ -92,6 +93,7 @@ class CameraRunner:
             self.size,
             noise=self.noise,
             unseen_is_free=self.unseen_is_free,
+            exact_poses=self.exact_poses,
         )
         base = robot.pose(robot.neutral, robot.links[0].name)[:3, 3]
         cameras = cameras_around(robot, settings, target=0.5 * (space.shoulder + middle))

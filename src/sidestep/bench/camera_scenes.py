@@ -29,7 +29,7 @@ class CameraSceneSettings:
 
     Attributes:
         robot: name for `Robot.named`. cameras: 1 or 2. unseen_is_free: see `PerceptionSettings`. size: of the images.
-        noise: name of a noise model. motion: how problems are run. seed: of the noise.
+        noise: name of a noise model. exact_poses: see `RigSettings`. motion: how problems are run. seed: of the noise.
 
     Raises:
         ValueError: a number of cameras that is not allowed.
@@ -40,6 +40,7 @@ class CameraSceneSettings:
     unseen_is_free: bool = True
     size: str = "848x480"
     noise: str = "d435"
+    exact_poses: bool = False
     motion: MotionSettings = field(default_factory=MotionSettings)
     seed: int = 0
 
@@ -65,6 +66,7 @@ def run_camera_scenes(
         "unseen_is_free": settings.unseen_is_free,
         "size": settings.size,
         "noise": settings.noise,
+        "exact_poses": settings.exact_poses,
         "duration": settings.motion.duration,
         "seed": settings.seed,
     }
@@ -99,6 +101,7 @@ class _Worker:
             size=settings.size,
             noise=settings.noise,
             unseen_is_free=settings.unseen_is_free,
+            exact_poses=settings.exact_poses,
             seed=settings.seed,
         )
         sighted = runner.move(problem)

@@ -39,6 +39,13 @@ def camera_scenes(
     problems: Annotated[int, typer.Option(min=1, help="Of each set, the first ones.")] = 10,
     size: SizeOption = "848x480",
     noise: Annotated[str, typer.Option(help="A noise model: d435, kinect, structured_light, none.")] = "d435",
+    exact_poses: Annotated[
+        bool,
+        typer.Option(
+            "--exact-poses",
+            help="Perception is told that the cameras' poses are exact, which they are; else 5 mm and 5 mrad.",
+        ),
+    ] = False,
     duration: DurationOption = 30.0,
     seed: SeedOption = 0,
     failures: FailuresOption = False,
@@ -76,6 +83,7 @@ def camera_scenes(
         unseen_is_free=unseen == "free",
         size=size,
         noise=noise,
+        exact_poses=exact_poses,
         motion=MotionSettings(duration=duration),
         seed=seed,
     )
