@@ -22,7 +22,8 @@ constexpr int missed_at_most = 5;         // Images that see the surface nearby,
 constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
 constexpr double settled_noise = 2.0;     // Noise of depths that explains a cell by one nearby, in standard deviations.
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
-constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it.
+constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it,
+constexpr double around = 0.35;           // so far from it, in sizes of the box.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
 
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
@@ -173,7 +174,9 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
     return Sight::elsewhere;
   }
   const Eigen::Vector2d pixel = seen.camera.project(middle);
-  const double offset_u = 0.35 * edge * seen.camera.fx / middle.z(), offset_v = 0.35 * edge * seen.camera.fy / middle.z();
+  // The samples are within the box: a cell beside the edge of something nearer is not hidden where what was in it is not.
+  const double offset = around * (voxel.high_corner() - voxel.low_corner()).maxCoeff() / middle.z();
+  const double offset_u = offset * seen.camera.fx, offset_v = offset * seen.camera.fy;
   const double noise = noise_beyond * seen.camera.noise.sigma(middle.z());
   int num_free = 0, num_inside = 0, num_surface = 0;
   for (int sample = 0; sample < samples_of_cell; ++sample) {

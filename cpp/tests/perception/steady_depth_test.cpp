@@ -30,6 +30,18 @@ struct Watching {
     std::vector<float> pixels(160 * 120);
     std::generate(pixels.begin(), pixels.end(), [&] { return normal(random); });
     image.take(camera, {std::span<const float>(pixels), 1.0});
+    add(distance);
+  }
+  /// The arm is in front of everything.
+  void hide(double distance) {
+    std::vector<float> pixels(160 * 120, static_cast<float>(distance));
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    std::fill(image.labels(), image.labels() + image.size(), PixelLabel::arm);
+    steady.add(camera, image);
+  }
+
+ private:
+  void add(double distance) {
     BOOST_TEST(test::allocations_of([&] { steady.add(camera, image); }) == 0u);
     double sum = 0.0, squares = 0.0;
     int num = 0;
@@ -68,6 +80,38 @@ BOOST_FIXTURE_TEST_CASE(another_surface_is_seen_at_once, Watching) {
   BOOST_TEST(std::abs(off) < 0.02 * noise);
   look(1.2);
   BOOST_TEST(std::abs(off) < 0.02 * noise);
+}
+
+BOOST_FIXTURE_TEST_CASE(one_stray_depth_does_not_forget_what_rests, Watching) {
+  for (int n = 0; n < 20; ++n) {
+    look(1.0);
+  }
+  look(0.9);
+  BOOST_TEST(spread > 0.9 * noise);
+  look(1.0);
+  BOOST_TEST(spread < 0.45 * noise);
+  look(0.9);
+  look(0.9);
+  for (int n = 0; n < 3; ++n) {  // two in a row are another surface
+    look(1.0);
+    BOOST_TEST(spread > 0.9 * noise);
+  }
+}
+
+BOOST_FIXTURE_TEST_CASE(what_the_arm_hides_for_a_while_rests_as_before, Watching) {
+  for (int n = 0; n < 20; ++n) {
+    look(1.0);
+  }
+  hide(0.6);
+  hide(0.6);
+  hide(0.6);
+  look(1.0);
+  BOOST_TEST(spread < 0.45 * noise);
+  hide(0.6);
+  for (int n = 0; n < 4; ++n) {  // it has come nearer behind the arm
+    look(1.0 - 2.5 * noise);
+  }
+  BOOST_TEST(std::abs(off) < 0.5 * noise);
 }
 
 BOOST_FIXTURE_TEST_CASE(what_moves_is_never_far_ahead_of_its_depth, Watching) {

@@ -251,6 +251,26 @@ BOOST_FIXTURE_TEST_CASE(a_few_pixels_count_when_a_second_image_shows_them, Mappe
   BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) > 0);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_flew_beside_a_near_edge_goes_when_it_is_seen_through, Mapped) {
+  const auto look = [&](float at_speck) {  // a plate at 1 m fills the columns up to 79, beside the speck
+    take(wall());
+    for (int v = 0; v < 120; ++v) {
+      std::fill_n(pixels.begin() + v * 160, 80, 1.0f);
+    }
+    pixels[59 * 160 + 80] = pixels[60 * 160 + 80] = at_speck;
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    image.labels()[59 * 160 + 80] = image.labels()[60 * 160 + 80] = PixelLabel::obstacle;
+    add();
+  };
+  look(1.5f);
+  look(1.5f);
+  BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) > 0);
+  look(3.5f);
+  BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) > 0);
+  look(3.5f);
+  BOOST_TEST(near({0.0, 0.0, 0.5}, 0.1) == 0);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_map_of_the_same_scene_allocates_nothing, Mapped) {
   const test::DepthScene scene = wall_and_ball();
   add(scene);

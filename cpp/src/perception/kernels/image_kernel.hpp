@@ -43,8 +43,8 @@ struct ImageKernel {
   void (*cells)(const CellCube& cube, const float* x, const float* y, const float* z, int count, int* cells);
   /// Adds 1 to `support` where a neighbour has the same depth within the tolerance, else to `others` where it has one.
   void (*compare)(const float* z, const float* neighbour, const float* tolerance, int count, float* support, float* others);
-  /// Takes depths into the means of their pixels: over `images`, with lasting differences `drift` [sigma]. `steady`: the mean of those that
-  /// rest, else the depth.
+  /// Takes depths into the means of their pixels: over `images`, below 0 where the last depth jumped, with lasting differences `drift`
+  /// [sigma]. `steady`: the mean of those that rest, else the depth.
   void (*steady)(const SteadyRule& rule, const float* z, const unsigned char* label, int count, float* mean, float* images,
                  float* drift, float* steady);
 };

@@ -62,14 +62,17 @@ void steady(const SteadyRule& rule, const float* __restrict__ z, const unsigned 
     const float noise = s.constant + s.quadratic * z[u] * z[u], away = z[u] - mean[u];
     const float lasting = drift[u] + share * (away / noise - drift[u]);
     const bool shows = label[u] == s.shows;
-    const bool is_new = !shows | (images[u] == 0.0f) | (__builtin_fabsf(away) > s.jump * noise);
+    const bool jumps = __builtin_fabsf(away) > s.jump * noise;
+    const bool strays = jumps & (images[u] > 0.0f);  // once: the mean waits
+    const bool waits = !shows | strays;
+    const bool is_new = (images[u] == 0.0f) | jumps;
     const bool moves = __builtin_fabsf(lasting) > s.drift;
-    const float next = images[u] + 1.0f, capped = next < s.most ? next : s.most;
+    const float held = __builtin_fabsf(images[u]), next = held + 1.0f, capped = next < s.most ? next : s.most;
     const float all = is_new ? 1.0f : moves ? 2.0f : capped;
-    mean[u] = is_new ? z[u] : mean[u] + away / all;
-    drift[u] = is_new | moves ? 0.0f : lasting;
-    images[u] = shows ? all : 0.0f;
-    steady[u] = all >= s.least ? mean[u] : z[u];
+    mean[u] = waits ? mean[u] : is_new ? z[u] : mean[u] + away / all;
+    drift[u] = waits ? drift[u] : is_new | moves ? 0.0f : lasting;
+    images[u] = !shows ? images[u] : strays ? -held : all;
+    steady[u] = !waits & (all >= s.least) ? mean[u] : z[u];
   }
 }
 
