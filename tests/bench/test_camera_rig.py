@@ -50,6 +50,24 @@ def test_the_room_is_out_of_reach() -> None:
     assert len(others) == 3
 
 
+def test_nothing_is_left_of_an_arm_whose_poses_are_exact() -> None:
+    """Images show the meshes to which covers are proven, not their convex hulls, which stand out of covers."""
+    arm = Arm.load("xarm7")
+    robot, q = arm.robot, arm.robot.neutral
+    settings = RigSettings((0.4,), noise="none", exact_poses=True)
+    controller = Controller(arm, ControllerSettings(synchronous=True, period=0.01, output="acceleration"))
+    with needs_opengl():
+        rig = CameraRig(robot, (), cameras_around(robot, settings), settings)
+    with rig:
+        rig.start(controller)
+        for k in range(20):
+            controller.step(q, np.zeros_like(q), time=0.01 * k)
+            rig.see(0.01 * k, q)
+        assert rig.perception is not None
+        assert rig.reports[-1][2].arm_pixels > 1000
+        assert len(rig.perception.cells()["radii"]) == 0
+
+
 def test_images_come_late_and_fill_the_map(planar: Robot, runner: ControllerRunner) -> None:
     arm = runner.arm
     assert isinstance(arm, Arm)

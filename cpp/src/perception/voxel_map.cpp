@@ -10,13 +10,15 @@
 namespace sidestep {
 namespace {
 
-constexpr double rests_after = 0.1;  // Time for which something must be seen before it is known to rest [s].
+constexpr double rests_after = 0.1;  // Time for which something must be seen before it is known to rest [s],
+constexpr int rests_images = 3;      // and number of images that must show it.
 constexpr double kept_per_seen =
     10.0;  // Time for which something is kept that moved when it was seen, in times for which it was seen.
 constexpr double kept_at_least = 0.3;       // The same, at least [s].
 constexpr float shrinks_by = 0.2f;          // Share of its excess by which a box shrinks from one image to the next.
 constexpr float settled_shrinks_by = 0.5f;  // The same of one that has been seen for long.
-constexpr double second_within = 0.5;       // Time within which a second image must show a voxel with few pixels [s].
+constexpr double second_within = 0.5;       // Time within which a second image must show a voxel with few pixels [s],
+constexpr int longest_gap = 1;              // with at most so many images of the camera in between.
 constexpr double noise_beyond = 3.0;        // Noise of a depth that is behind a cell, in standard deviations.
 constexpr int missed_at_most = 5;         // Images that see the surface nearby, and not in the cell, after which it was noise.
 constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
@@ -143,7 +145,12 @@ void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
 }
 
 void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
-  const bool shown_again = voxel.first < seen.time && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
+  const bool in_a_row = voxel.gap <= longest_gap && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
+  if (!voxel.counts && !in_a_row) {  // depths that fly beside an edge come back to a cell now and then
+    voxel.first = seen.time;
+    voxel.shown_images = 0;
+  }
+  const bool shown_again = voxel.first < seen.time;
   const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
@@ -163,7 +170,8 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.shown_by |= bit(seen.number);
   voxel.error = static_cast<float>(seen.camera.translation_error + seen.camera.rotation_error * distance);
   voxel.last = std::max(voxel.last, seen.time);
-  voxel.free_images = voxel.missed_images = 0;
+  voxel.free_images = voxel.missed_images = voxel.gap = 0;
+  voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
 }
 
@@ -210,6 +218,7 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
 
 void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept {
   voxel.shown_by &= static_cast<std::uint16_t>(~bit(seen.number));
+  voxel.gap = static_cast<std::uint8_t>(std::min(voxel.gap + (seen.number == voxel.camera ? 1 : 0), 255));
   const Sight what = sight(voxel, seen, X_CW);
   if (what == Sight::free) {
     voxel.is_hidden = false;
@@ -224,7 +233,7 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
   }
   voxel.is_hidden = voxel.is_hidden || what == Sight::hidden;
   const double was_seen = voxel.last - voxel.first;
-  const bool may_move = voxel.moves || was_seen < rests_after;
+  const bool may_move = voxel.moves || was_seen < rests_after || voxel.shown_images < rests_images;
   const double kept = may_move ? std::min(settings_.memory, kept_at_least + kept_per_seen * was_seen) : settings_.memory;
   if (seen.time - voxel.last > (voxel.counts ? kept : second_within)) {
     remove(voxel);

@@ -19,6 +19,7 @@ from sidestep._core import (
     PerceptionReport,
     PerceptionSettings,
 )
+from sidestep.bench.camera_scene import as_collision_meshes
 from sidestep.bench.workspace import Workspace
 from sidestep.distance import SceneObject
 from sidestep.math.pose import look_at
@@ -164,7 +165,7 @@ class CameraRig:
         from sidestep.simulation.model import build_model
 
         self.cameras, self.settings, self.objects = list(cameras), settings, tuple(objects)
-        self.built = build_model(robot, self.objects, visuals=False)
+        self.built = build_model(as_collision_meshes(robot), self.objects)
         self._data = mujoco.MjData(self.built.model)
         ids = self.built.model.body_mocapid[list(self.built.object_bodies)]
         self._moving = [
@@ -179,7 +180,6 @@ class CameraRig:
                 latency=settings.latency,
                 lost=settings.lost,
                 seed=seed * len(self.cameras) + number,
-                links="collision",
             )
             for number, sensor in enumerate(sensors)
         ]

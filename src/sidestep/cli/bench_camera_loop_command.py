@@ -31,7 +31,7 @@ def camera_scenes(
     folder: Annotated[
         Path, typer.Argument(help="Folder of sets, or one set: sceneNNNN.yaml, requestNNNN.yaml.")
     ],
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "panda",
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`, or a URDF file.")] = "panda",
     cameras: Annotated[int, typer.Option(min=1, max=2, help="Over the arm's shoulders.")] = 1,
     unseen: Annotated[
         str, typer.Option(help="What space that no camera has seen counts as: free or closed.")

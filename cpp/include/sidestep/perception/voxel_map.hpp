@@ -26,6 +26,8 @@ struct Voxel {
   std::uint16_t shown_by;             ///< Cameras whose last image shows it, as bits.
   std::uint8_t missed_images;         ///< Images since then that saw a surface there, and nothing in the cell.
   std::uint8_t free_images;           ///< Images in a row that saw through it.
+  std::uint8_t gap;                   ///< Images of its camera since the last one that showed it.
+  std::uint8_t shown_images;          ///< Images that showed it, at most 255.
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool moves;                         ///< What was in it moved when it was seen last.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
