@@ -14,6 +14,7 @@ namespace {
 
 constexpr float noise_of_depth = 3.0f;  // Noise along the ray that a pixel of the arm may have, in standard deviations.
 constexpr double pixels_at_edge = 1.0;  // Error of a silhouette [pixel].
+constexpr double pixels_bled = 2.0;     // Pixels beside a silhouette that may have the arm's depth: a camera matches windows.
 constexpr double core_share = 0.5;      // Semi-axes of an ellipsoid's core, as a share of its own: links fill it.
 constexpr int core_stride = 2;          // Every how many pixels rays through cores are looked at, in both directions.
 constexpr float no_front = std::numeric_limits<float>::infinity();
@@ -72,8 +73,9 @@ double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& cam
   const KinematicState::Link& link = link_or_world(now.arm, ellipsoid.joint);
   const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - now.X_WC.translation()).norm();
   const double moved = std::max(displacement(ellipsoid, before, now), displacement(ellipsoid, now, after));
-  return camera.translation_error + camera.rotation_error * distance +
-         pixels_at_edge * distance / std::min(camera.fx, camera.fy) + moved;
+  const double pixel = distance / std::min(camera.fx, camera.fy);
+  const double elsewhere = camera.translation_error + camera.rotation_error * distance;
+  return std::max(elsewhere, pixels_bled * pixel) + pixels_at_edge * pixel + moved;
 }
 
 void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const ArmInView& before, const ArmInView& now,

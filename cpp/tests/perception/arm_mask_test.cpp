@@ -61,6 +61,26 @@ BOOST_FIXTURE_TEST_CASE(without_errors_exactly_the_arm_is_taken_out, Masked) {
   }
 }
 
+BOOST_FIXTURE_TEST_CASE(an_edge_that_bled_by_two_pixels_is_the_arm, Masked) {
+  test::DepthScene scene;
+  scene.add_arm(arm.robot(), arm.body(), q);
+  const std::vector<float> pixels = scene.image(camera);  // 0 beside the arm
+  std::vector<float> bled = pixels;
+  std::vector<std::size_t> beside;
+  for (std::size_t i = 2; i + 2 < pixels.size(); ++i) {
+    const float depth = std::max({pixels[i - 2], pixels[i - 1], pixels[i + 1], pixels[i + 2]});
+    if (pixels[i] == 0.0f && depth > 0.0f) {
+      bled[i] = depth;
+      beside.push_back(i);
+    }
+  }
+  BOOST_TEST(beside.size() > 50u);
+  mark(bled);
+  for (const std::size_t i : beside) {
+    BOOST_TEST((image.labels()[i] == PixelLabel::arm));
+  }
+}
+
 BOOST_FIXTURE_TEST_CASE(depths_on_a_grown_ellipsoid_are_those_of_its_equation, Masked) {
   camera.translation_error = 0.01;
   mark(std::vector<float>(image.size(), 1.2f));
@@ -123,7 +143,7 @@ BOOST_FIXTURE_TEST_CASE(a_camera_on_a_link_sees_the_base_move, Masked) {
     const BodyEllipsoid& ellipsoid = mask.ellipsoids()[k];
     const KinematicState::Link& link = link_or_world(at, ellipsoid.joint);
     const double distance = (link.R_WL * ellipsoid.mean + link.p_WL - from.translation()).norm();
-    const double moved = mask.growth()[k] - distance / 120.0;
+    const double moved = mask.growth()[k] - 3.0 * distance / 120.0;
     if (ellipsoid.joint == 3) {
       BOOST_TEST(moved < 1e-9);  // the camera goes with it
     } else {
@@ -149,7 +169,9 @@ BOOST_FIXTURE_TEST_CASE(an_arm_elsewhere_lets_rays_pass, Masked) {
   scene.add_arm(arm.robot(), arm.body(), q);
   mark(scene.image(camera));
   BOOST_TEST(mask.residual().through_share() == 0.0);
-  BOOST_TEST(std::abs(mask.residual().depth_error) < 0.03);
+  const double grown = *std::max_element(mask.growth().begin(), mask.growth().end());
+  BOOST_TEST(mask.residual().depth_error > 0.0);
+  BOOST_TEST(mask.residual().depth_error < 2.0 * grown);  // rays that graze a cover meet it earlier than by its growth
   q[1] += 0.5;
   mark(scene.image(camera));
   BOOST_TEST(mask.residual().through_share() > 0.25);

@@ -34,9 +34,11 @@ struct ArmResidual {
 /// The arm in the image: which pixels show its links and what it holds, and from which depth on it hides what is behind.
 ///
 /// Each covering ellipsoid {p : (p - c)ᵀ S⁻¹ (p - c) <= 1} grows by δ, what errors explain at its place:
-///     δ = translation error + rotation error · distance + one pixel + the way that it moves in the camera's frame within the clock error,
-/// to S' = (1 + δ/a) S + (1 + a/δ) δ² I with the mean semi-axis a, which contains all points within δ of it. A ray z (x, y, 1) is inside
-/// where α z² - 2 β z + γ <= 0; a pixel shows the arm where its depth is there, but for three standard deviations of noise along the ray.
+///     δ = max(translation error + rotation error · distance, two pixels) + one pixel
+///         + the way that it moves in the camera's frame within the clock error,
+/// where two pixels are what a silhouette bleeds, to S' = (1 + δ/a) S + (1 + a/δ) δ² I with the mean semi-axis a, which contains all
+/// points within δ of it. A ray z (x, y, 1) is inside where α z² - 2 β z + γ <= 0; a pixel shows the arm where its depth is there, but for
+/// three standard deviations of noise along the ray.
 class ArmMask {
  public:
   /// Throws std::invalid_argument where the body is not calibrated.
