@@ -13,6 +13,12 @@ from sidestep.controller import ControllerSettings
 from sidestep.robot import planar_arm
 
 
+def moves(controller: ss.Controller) -> bool:
+    """Whether it sets out within 20 ms: a path that a thread has found begins with no acceleration."""
+    steps = [controller.step([0, 0], [0, 0], time=0.001 * n).acceleration for n in range(1, 21)]
+    return bool(np.abs(steps).max() > 0.1)
+
+
 def test_torque_output_asks_for_the_effort_limits_that_are_not_given() -> None:
     text = re.sub(r'effort="[^"]*"', 'effort="0"', planar_arm(2))
     with pytest.warns(
@@ -24,7 +30,7 @@ def test_torque_output_asks_for_the_effort_limits_that_are_not_given() -> None:
     controller = ss.Controller(arm, ControllerSettings(output="acceleration"))
     controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal([0.5, 0.3])
-    assert np.abs(controller.step([0, 0], [0, 0]).acceleration).max() > 0.1  # it moves
+    assert moves(controller)
     given = ss.Arm.load(text, effort_limits={"joint1": 87, "joint2": 12})
     np.testing.assert_array_equal(given.limits.effort, [87.0, 12.0])
     ss.Controller(given, ControllerSettings(output="torque"))
@@ -43,7 +49,7 @@ def test_an_inertia_of_no_body_leaves_the_arm_without_dynamics() -> None:
     controller = ss.Controller(arm)
     controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal([0.5, 0.3])
-    assert np.abs(controller.step([0, 0], [0, 0]).acceleration).max() > 0.1  # it moves
+    assert moves(controller)
 
 
 def test_the_command_takes_limits_by_joint(tmp_path: Path) -> None:

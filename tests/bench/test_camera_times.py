@@ -16,7 +16,7 @@ from sidestep.bench.cloud_recipe import off_the_arm, points_of, update_by_recipe
 from sidestep.cli import main
 from sidestep.perception import DepthCamera, Frame
 
-TINY = {"images": 3, "width": 106, "height": 60, "rounds": 1, "seconds": 0.2}
+TINY = {"images": 3, "width": 212, "height": 120, "rounds": 1, "seconds": 0.2}
 
 
 @pytest.fixture(scope="module")
