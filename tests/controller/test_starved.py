@@ -121,9 +121,8 @@ def test_the_planner_says_how_old_its_look_is():
     made = [command for command, _ in steps(controller, 1500)]
     ages = np.array([command.planner_age for command in made])
     grows = np.diff(ages)
-    assert np.all(
-        (np.abs(grows - PERIOD) < 1e-9) | (grows < PERIOD) | (grows > 0.02)
-    )  # rounding; a look by the clock
+    # From one look to the next; a look by the clock has an age of its own, and there are few.
+    assert np.mean(np.abs(grows - PERIOD) < 1e-9) > 0.5
     assert ages.max() > 0.1  # it wakes up every 20 ms, in which some hundred steps are made
     assert {command.look_ahead_age for command in made} == {0.0}
 
