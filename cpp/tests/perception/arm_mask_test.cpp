@@ -164,14 +164,19 @@ BOOST_FIXTURE_TEST_CASE(what_is_in_front_and_behind_stays, Masked) {
 
 BOOST_FIXTURE_TEST_CASE(an_arm_elsewhere_lets_rays_pass, Masked) {
   camera.translation_error = 0.005;
+  camera.width = 320;  // the same view with pixels of half the size, by three of which covers grow
+  camera.height = 240;
+  camera.fx = camera.fy = 240.0;
+  camera.cx = 159.5;
+  camera.cy = 119.5;
+  rays = CameraRays(camera);
+  image = DepthImage(camera);
   test::DepthScene scene;
   scene.floor = -0.3;
   scene.add_arm(arm.robot(), arm.body(), q);
   mark(scene.image(camera));
   BOOST_TEST(mask.residual().through_share() == 0.0);
-  const double grown = *std::max_element(mask.growth().begin(), mask.growth().end());
-  BOOST_TEST(mask.residual().depth_error > 0.0);
-  BOOST_TEST(mask.residual().depth_error < 2.0 * grown);  // rays that graze a cover meet it earlier than by its growth
+  BOOST_TEST(std::abs(mask.residual().depth_error) < 0.03);
   q[1] += 0.5;
   mark(scene.image(camera));
   BOOST_TEST(mask.residual().through_share() > 0.25);

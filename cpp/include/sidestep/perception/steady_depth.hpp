@@ -10,10 +10,11 @@ namespace sidestep {
 
 /// Depths of a camera that stands still, with less noise: each pixel that shows an obstacle has the mean m of its last images.
 ///
-/// m <- m + (z - m)/n, with n the number of images, at most the most. Another surface, |z - m| > 4 sigma(z), counts at once as it is; in two
-/// images in a row it begins a new mean (n = 1). The mean also waits while the arm hides the pixel, or it shows nothing. A depth that stays on one side of the mean, by 1.2 sigma over about seven images, is a surface that moves: m goes half of the way (n = 2).
-/// Before n = 5 the depth itself counts. So a surface that moves by 1 sigma or more from image to image is not averaged, and a slower one
-/// is shown less than 2 sigma behind where it is.
+/// m <- m + (z - m)/n, with n the number of images, at most the most. Another surface, |z - m| > 4 sigma(z), counts at once as it is; in
+/// two images in a row it begins a new mean (n = 1). The mean also waits while the arm hides the pixel, or it shows nothing. A depth that
+/// stays on one side of the mean, by 1.2 sigma over about seven images, is a surface that moves: m goes half of the way (n = 2). Before
+/// n = 5 the depth itself counts. So a surface that moves by 1 sigma or more from image to image is not averaged, and a slower one is shown
+/// less than 2 sigma behind where it is.
 class SteadyDepth {
  public:
   SteadyDepth(const DepthCamera& camera, int most_images);
