@@ -15,11 +15,10 @@ from sidestep.perception.colours import CELLS, MEANINGS, PIXELS, rgb
 from sidestep.perception.pictures import depth_picture, label_picture, view_from_beside
 from sidestep.perception.seen_stages import CELL_KINDS, SeenStages
 from sidestep.robot import Robot
-from sidestep.studio.guard import Guard
+from sidestep.studio.guarded_page import GuardedPage
 from sidestep.studio.page.arm import ArmView, BodyView, merged_meshes
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.page.scene import point_cameras, set_up_scene
-from sidestep.studio.server import HOST, address_of, check_port, guarded_server
 from sidestep.studio.show.reading import with_links
 from sidestep.studio.show.shapes import drawable_shapes
 
@@ -38,7 +37,7 @@ UNSEEN = 0.006  # [m] a cell that nobody has seen is drawn small: others are see
 PALEST, FAR = 0.5, 4.0  # share of white in the colour of a cell that is so far [m] from the camera
 
 
-class CameraView:
+class CameraView(GuardedPage):
     """The page: the arm, cameras and cells in 3-D, and the images beside; stop it with `stop`, or use it as a context.
 
     Args:
@@ -50,10 +49,7 @@ class CameraView:
     """
 
     def __init__(self, arm: Arm, *, port: int = PORT) -> None:
-        check_port(HOST, port)
-        guard = Guard(HOST)
-        self.server = guarded_server(HOST, port, guard)
-        self.port, self._token = self.server.get_port(), guard.token
+        super().__init__(port)
         set_up_scene(self.server)
         self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         self.server.gui.main_panel.dock_right()
@@ -69,17 +65,6 @@ class CameraView:
         self._images: dict[str, tuple[Any, Any]] = {}
         self._placed = False
         self._stopping = threading.Event()
-
-    def __enter__(self) -> CameraView:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    @property
-    def address(self) -> str:
-        """What to open in a browser."""
-        return f"{address_of(HOST, self.port)}/{self._token}/"
 
     @property
     def paused(self) -> bool:

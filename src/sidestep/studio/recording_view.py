@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import threading
 import time as clock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +15,12 @@ from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.report.recorded_run import RecordedRun
 from sidestep.robot import Robot
-from sidestep.studio.guard import Guard
+from sidestep.studio.guarded_page import GuardedPage
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, reach
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.page.scene import point_cameras, set_up_scene
-from sidestep.studio.server import HOST, address_of, check_port, guarded_server
 from sidestep.studio.show.reading import with_links
-
-if TYPE_CHECKING:
-    import viser
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +33,7 @@ LEAST_BALL = 0.004  # [m] radius of a ball that is still seen
 LAST_EVENTS = 6  # lines of what happened
 
 
-class RecordingView:
+class RecordingView(GuardedPage):
     """The page: the recorded arm among the obstacles as they were; stop it with `stop`, or use it as a context.
 
     Args:
@@ -53,10 +49,7 @@ class RecordingView:
             raise ValueError(
                 f"{', '.join(map(str, run.paths))}: no step was recorded, there is nothing to play"
             )
-        check_port(HOST, port)
-        guard = Guard(HOST)
-        self.server: viser.ViserServer = guarded_server(HOST, port, guard)
-        self.port, self._token = self.server.get_port(), guard.token
+        super().__init__(port)
         self.run = run
         self._ball = trimesh.creation.icosphere(subdivisions=1)
         self._scene: Any = None
@@ -71,17 +64,6 @@ class RecordingView:
             raise
         self._thread = threading.Thread(target=self._play, daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> RecordingView:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    @property
-    def address(self) -> str:
-        """What to open in a browser."""
-        return f"{address_of(HOST, self.port)}/{self._token}/"
 
     @property
     def step(self) -> int:

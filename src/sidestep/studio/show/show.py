@@ -6,8 +6,7 @@ import logging
 import threading
 from typing import TYPE_CHECKING
 
-from sidestep.studio.guard import Guard
-from sidestep.studio.server import HOST, address_of, check_port, guarded_server
+from sidestep.studio.guarded_page import GuardedPage
 from sidestep.studio.show.facts_panel import FactsPanel
 from sidestep.studio.show.reading import Reading
 from sidestep.studio.show.touching import TouchMonitor
@@ -20,7 +19,7 @@ ENDING = 10.0  # [s] at most until the loading of meshes ends
 LOADED = 120.0  # [s] at most until the arm is on the page, for `wait_ready`
 
 
-class Show:
+class Show(GuardedPage):
     """A robot on a page of this machine; stop it with `stop`, or use it as a context.
 
     The page and its websocket are refused without the token in `address`, as the studio's are.
@@ -34,10 +33,7 @@ class Show:
     """
 
     def __init__(self, reading: Reading, *, port: int = PORT) -> None:
-        check_port(HOST, port)
-        guard = Guard(HOST)
-        self.server = guarded_server(HOST, port, guard)
-        self.port, self._token = self.server.get_port(), guard.token
+        super().__init__(port)
         self.panel = FactsPanel(self.server, reading)
         self.view: ShowView | None = None
         self.error = ""
@@ -46,17 +42,6 @@ class Show:
         self._touch = TouchMonitor(reading.robot, lambda found, _: self.panel.show_touching(found))
         self._thread = threading.Thread(target=self._load, daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Show:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    @property
-    def address(self) -> str:
-        """What to open in a browser."""
-        return f"{address_of(HOST, self.port)}/{self._token}/"
 
     def wait_ready(self, timeout: float = LOADED) -> ShowView:
         """The arm on the page.
