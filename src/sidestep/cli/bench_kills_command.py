@@ -26,7 +26,8 @@ def kills(
 
     A simulated FR3, its server with a supervisor, and clients are programs of their own. The arm must come to rest
     within its limits of position and velocity, somebody must say why, the arm must be led to its goal afterwards, and
-    at most the last second of the recording may be lost. `network` needs the right to make a network of its own. Exit
+    at most the last second of the recording may be lost. A case begins anew, at most twice, where a busy machine had
+    stopped the arm first; its row says how often (`busy`). `network` needs the right to make a network of its own. Exit
     code: 0 where all of that holds in every run, else 1.
     """
     from sidestep.bench.kills import CASES, run_kills

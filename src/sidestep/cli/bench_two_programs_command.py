@@ -11,7 +11,7 @@ from sidestep.cli.bench_campaign import FileOption, ShardOption, campaign_rows, 
 from sidestep.cli.bench_output import JobsOption, SeedOption, figures_table
 from sidestep.cli.limit_options import by_name
 from sidestep.cli.output import JsonOption, QuietOption
-from sidestep.cli.simulate_command import delay_of
+from sidestep.cli.simulate_command import DelayOption, JitterOption, LossOption, delay_of
 
 LIMITS = ("position", "velocity", "torque", "torque rate", "acceleration", "jerk")
 FIGURES = (
@@ -24,15 +24,9 @@ FIGURES = (
 def two_programs(
     problems: Annotated[int, typer.Option(min=0, help="Reach problems, beside the scenarios.")] = 50,
     robot: Annotated[str, typer.Option(help="Of the reach problems; a name from `sidestep robots`.")] = "fr3",
-    delay: Annotated[
-        str, typer.Option(metavar="MIN:MAX", help="Of messages, in each direction [ms]; drawn once a second.")
-    ] = "1:5",
-    jitter: Annotated[
-        float, typer.Option(min=0.0, help="Mean of what each message takes longer [ms].")
-    ] = 0.5,
-    loss: Annotated[
-        float, typer.Option(min=0.0, max=0.99, help="Share that is lost, in each direction.")
-    ] = 0.1,
+    delay: DelayOption = "1:5",
+    jitter: JitterOption = 0.5,
+    loss: LossOption = 0.1,
     speed: Annotated[
         float,
         typer.Option(min=0.0, help="Of the simulator: 0, as fast as it is asked; 1, the machine's clock."),

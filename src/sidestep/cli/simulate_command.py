@@ -6,7 +6,7 @@ import gc
 import os
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -16,6 +16,16 @@ from sidestep.simulation.link import HOLD_CYCLES
 
 if TYPE_CHECKING:
     from sidestep.simulation.simulator import Simulator
+
+DelayOption: TypeAlias = Annotated[
+    str, typer.Option(metavar="MIN:MAX", help="Of messages, in each direction [ms]; drawn once a second.")
+]
+JitterOption: TypeAlias = Annotated[
+    float, typer.Option(min=0.0, help="Mean of what each message takes longer [ms], exponential.")
+]
+LossOption: TypeAlias = Annotated[
+    float, typer.Option(min=0.0, max=0.99, help="Share of the messages that are lost, in each direction.")
+]
 
 
 def simulate(
@@ -44,15 +54,9 @@ def simulate(
         str | None,
         typer.Option(metavar="Q1,Q2,…", help="Of a robot by name [rad or m] [default: mid-range]."),
     ] = None,
-    delay: Annotated[
-        str, typer.Option(metavar="MIN:MAX", help="Of messages, in each direction [ms]; drawn once a second.")
-    ] = "0:0",
-    jitter: Annotated[
-        float, typer.Option(min=0.0, help="Mean of what each message takes longer [ms], exponential.")
-    ] = 0.0,
-    loss: Annotated[
-        float, typer.Option(min=0.0, max=0.99, help="Share of the messages that are lost, in each direction.")
-    ] = 0.0,
+    delay: DelayOption = "0:0",
+    jitter: JitterOption = 0.0,
+    loss: LossOption = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Of delays and losses.")] = 0,
     speed: Annotated[
         float,
