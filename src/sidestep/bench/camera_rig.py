@@ -52,7 +52,7 @@ class RigSettings:
         azimuths: of the cameras around the vertical through the shoulder [rad]. size: of the images, of `SIZES`.
         rate: of the images [Hz]. latency: until they come [s]. lost: share of them that never come.
         noise: name of a noise model. unseen_is_free: see `PerceptionSettings`.
-        exact_poses: it is told that the poses of cameras, which are exact, are exact; else `DepthCamera`'s bounds.
+        exact_poses: Perception is told that poses have no error, which is so; else the bounds of `DepthCamera`.
 
     Raises:
         ValueError: an unknown size, no camera, or a number out of range.

@@ -24,11 +24,8 @@ LONGEST_WAY = 40.0  # [s] to the goal
 SLACK = 1.02  # of limits: the simulated robot tracks with a small error
 ENCODERS = 1e-3  # [rad] beyond a position limit that is rounding
 NEAR = 0.02  # [rad] from the goal
-BUSY = (
-    "the machine is too busy",
-    "went without commands for too long",
-    "age of the state",
-)  # what a server says then
+#: What a server says where a busy machine has stopped the arm.
+BUSY = ("the machine is too busy", "went without commands for too long", "age of the state")
 
 
 class TrialError(RuntimeError):
@@ -73,7 +70,7 @@ class KillOutcome:
         return stopped and self.says_why and self.resumed and recorded and not self.error
 
     def was_disturbed(self, said: str) -> bool:
-        """Whether the arm stopped for a busy machine instead, within its limits; said: by the server."""
+        """Whether a busy machine stopped the arm first, within its limits. said: what the server has printed."""
         harmless = self.limits or bool(self.error)
         return harmless and not self.says_why and any(words in said for words in BUSY)
 

@@ -255,14 +255,12 @@ def _programs(folder: Path, case: str, prefix: tuple[str, ...]) -> Programs:
 
 
 def _run(programs: Programs, outcome: KillOutcome) -> str:
-    """The case; what the server has said. That a case did not come about is its error."""
+    """Runs the case and returns what the server has printed. A case that did not come about has an error."""
     try:
         programs.start_simulator()
         programs.start_server()
-        seen = (
-            None if programs.prefix else Watcher(programs.robot)
-        )  # nobody outside of a network sees the robot
-        trial = Trial(outcome, programs, seen)
+        # Nobody outside of a network of its own sees the robot.
+        trial = Trial(outcome, programs, None if programs.prefix else Watcher(programs.robot))
         try:
             CASES[outcome.case](trial)
         except TrialError as error:
