@@ -11,6 +11,7 @@ import numpy as np
 import sidestep as ss
 
 PERIOD = 0.004  # [s]
+PATIENCE = 10.0  # of the stand-in [s]: the program may take its time before the first command
 
 
 class JsonRobot:
@@ -32,11 +33,13 @@ class JsonRobot:
         """The robot takes commands from now on."""
 
     def read(self, timeout):
-        """Waits for the robot's next state: it is the clock."""
-        self._socket.settimeout(timeout)
-        try:
-            state = json.loads(self._socket.recv(4096))
-        except (TimeoutError, BlockingIOError):  # the latter where it is not to wait
+        """Waits for the robot's next state, which is the clock; the newest, where several have come meanwhile."""
+        state = None
+        with contextlib.suppress(TimeoutError, BlockingIOError):  # the latter where it is not to wait
+            while True:
+                self._socket.settimeout(0.0 if state else timeout)
+                state = json.loads(self._socket.recv(4096))
+        if state is None:
             return None
         if state["fault"]:
             raise ss.drivers.RobotStopped(state["fault"])
@@ -53,12 +56,12 @@ class JsonRobot:
 
 
 def stand_in(server, q, period):
-    """A robot that is where it was told to be, and says so once a period, until nobody speaks for a second."""
-    server.settimeout(1.0)
+    """A robot that is where it was told to be, and says so once a period, until nobody speaks for long."""
+    server.settimeout(PATIENCE)
     client = server.recvfrom(4096)[1]
     v, told = 0.0 * q, time.monotonic()
     server.settimeout(period / 4)
-    while time.monotonic() - told < 1.0:
+    while time.monotonic() - told < PATIENCE:
         due, state = time.monotonic() + period, {"q": q.tolist(), "v": v.tolist(), "fault": ""}
         server.sendto(json.dumps(state).encode(), client)
         while time.monotonic() < due:
