@@ -10,8 +10,7 @@ import numpy as np
 
 import sidestep as ss
 
-PERIOD = 0.004  # [s]
-PATIENCE = 10.0  # of the stand-in [s]: the program may take its time before the first command
+PERIOD, PATIENCE = 0.004, 10.0  # [s]; before the first command the program may take its time
 
 
 class JsonRobot:
@@ -39,11 +38,9 @@ class JsonRobot:
             while True:
                 self._socket.settimeout(0.0 if state else timeout)
                 state = json.loads(self._socket.recv(4096))
-        if state is None:
-            return None
-        if state["fault"]:
+        if state and state["fault"]:
             raise ss.drivers.RobotStopped(state["fault"])
-        return ss.drivers.RobotState(state["q"], state["v"], time=time.monotonic())
+        return state and ss.drivers.RobotState(state["q"], state["v"], time=time.monotonic())
 
     def write(self, command):
         self._send(position=command.position.tolist())
