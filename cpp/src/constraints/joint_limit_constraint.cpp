@@ -10,12 +10,18 @@
 namespace sidestep {
 
 JointLimitConstraint::JointLimitConstraint(JointLimits limits, JointLimitSettings settings)
-    : limits_(std::move(limits)), slower_(limits_), settings_(settings) {}
+    : limits_(std::move(limits)), tighter_(limits_), settings_(settings) {}
 
 void JointLimitConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) noexcept {
   const LastCommand& last = now.last;
-  slower_.velocity = now.speed_share * limits_.velocity;
-  bounds.box.update(slower_, now.position, now.velocity, now.period,
+  tighter_.velocity = now.speed_share * limits_.velocity;
+  constexpr double most = 0.25;  // of a joint's way
+  for (Eigen::Index i = 0; i < tighter_.lower.size(); ++i) {
+    const double inside = std::min(now.inside, most * (limits_.upper[i] - limits_.lower[i]));
+    tighter_.lower[i] = limits_.lower[i] + inside;
+    tighter_.upper[i] = limits_.upper[i] - inside;
+  }
+  bounds.box.update(tighter_, now.position, now.velocity, now.period,
                     {settings_.position_margin, now.jerk_share, last.acceleration_factor},
                     last.binds ? last.acceleration : nullptr);
   if (last.acceleration_factor > 1.0 && now.wanted != nullptr) {
@@ -64,7 +70,7 @@ void JointLimitConstraint::widen_to_overruns(const Moment& now, Bounds& bounds) 
     double lower = std::clamp((-fastest - velocity) / now.period, -most, most);
     const double jerk = now.jerk_share * limits_.jerk[i];
     if (limits_.effort_rate[i] < infinity && jerk < infinity) {
-      const ScalarLimits limits{limits_.lower[i] + settings_.position_margin, limits_.upper[i] - settings_.position_margin,
+      const ScalarLimits limits{tighter_.lower[i] + settings_.position_margin, tighter_.upper[i] - settings_.position_margin,
                                 fastest, limits_.acceleration[i]};
       const double up = largest_returnable(limits.upper - position, velocity, lower, upper, limits, jerk, now.period).value;
       const double down =

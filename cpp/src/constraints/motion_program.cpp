@@ -114,6 +114,7 @@ ProgramStatus MotionProgram::solve(const MotionRequest& request, MotionSolution&
   const double period = periods.coming > 0.0 ? periods.coming : settings_.period;
   const Moment now{period,
                    effort_has_rate_ && settings_.by_torque ? periods.speed : 1.0,
+                   effort_has_rate_ && settings_.by_torque ? periods.inside : 0.0,
                    periods.torque > 0.0 ? std::min(periods.torque, period) : period,
                    position_,
                    velocity_,

@@ -17,6 +17,8 @@ constexpr double most_lead = 0.5;            // jitter of the machine's clock th
 constexpr double most_uncounted = 0.5;       // jitter that the reference does not count [periods]
 constexpr double steadiness = 0.15;          // change of the measured period that is jitter, as a share of it [-]
 constexpr double most_missed_at_once = 1e8;  // missed periods that are counted of one step
+constexpr double recall = 1.0;               // over which the share of missing steps is taken [s]
+constexpr double said_from = 0.05;           // share of missing steps that is said [-]
 
 double in_seconds(std::chrono::steady_clock::duration duration) noexcept {
   return std::chrono::duration<double>(duration).count();
@@ -131,9 +133,14 @@ double Clock::next_period() noexcept {
 }
 
 void Clock::count(double elapsed) noexcept {
+  Tick& t = tick_;
   if (elapsed > late_from * period_) {
-    ++tick_.late;
-    tick_.missed += static_cast<int>(std::min(std::round(elapsed / period_) - 1.0, most_missed_at_once));
+    ++t.late;
+    t.missed += static_cast<int>(std::min(std::round(elapsed / period_) - 1.0, most_missed_at_once));
+  }
+  if (!t.gap) {  // a pause says nothing of what comes after it
+    const double missing = elapsed > late_from * t.expected ? 1.0 - t.expected / elapsed : 0.0;
+    t.missed_share += std::min(1.0, elapsed / recall) * (missing - t.missed_share);
   }
 }
 
@@ -145,6 +152,8 @@ std::string Clock::explain() const {
     std::snprintf(text, sizeof text, "the time stands still");
   } else if (tick_.period != period_) {
     std::snprintf(text, sizeof text, "called every %.1f ms, told %.1f ms", 1e3 * tick_.period, 1e3 * period_);
+  } else if (tick_.missed_share > said_from) {
+    std::snprintf(text, sizeof text, "%.0f %% of the steps are missing", 1e2 * tick_.missed_share);
   }
   return text;
 }

@@ -11,7 +11,9 @@ namespace sidestep {
 Robot within_margins(const Robot& robot, const ControllerSettings& settings, double speed);
 
 /// Periods for the program of a step.
-inline MotionPeriods periods_of(const Tick& tick) noexcept { return {tick.period, tick.torque_period(), tick.speed_share()}; }
+inline MotionPeriods periods_of(const Tick& tick) noexcept {
+  return {tick.period, tick.torque_period(), tick.speed_share(), tick.inside()};
+}
 
 /// The quadratic program for torque, or for acceleration where the arm is not moved by torque.
 class JointProgram {

@@ -22,6 +22,8 @@ struct Tick {
   double offset = 0.0;  ///< own time less the caller's
   int late = 0;         ///< steps so far that came later than one and a half periods of the settings after the one before
   int missed = 0;       ///< periods of the settings so far in which a step was missing
+  /// Share of the expected periods, lately, in which a step was missing: of a connection that loses messages, not of a loop that is slow.
+  double missed_share = 0.0;
 
   /// A stamp of the caller's clock on the controller's own: of the clock that steps are told; before any was, of the machine's
   /// (std::chrono::steady_clock, in Python time.monotonic), in a synchronous run of the controller's own.
@@ -32,11 +34,22 @@ struct Tick {
   /// Time for whose change of torque a step may make up: a drive judges each of its own periods, however rarely it is told.
   double torque_period() const noexcept { return std::min(elapsed, told); }
 
-  /// Share of its speed for an arm whose torques change at a limited rate: gravity and inertia ask for less of it in slower motions, and
-  /// a loop below half of the told rate leaves them too little.
+  /// How much is missing, from 0, a share that costs nothing, to 1.
+  double missing() const noexcept {
+    constexpr double few = 0.02, many = 0.1;
+    return std::clamp((missed_share - few) / (many - few), 0.0, 1.0);
+  }
+  /// Share of its speed for an arm whose torques change at a limited rate. Gravity and inertia ask for less of it in slower motions, and
+  /// a loop below half of the told rate leaves them too little. Where steps are missing, torques do not arrive: what they would have braked
+  /// is made up for at that rate, and meanwhile a joint goes on beyond a limit that it was to keep.
   double speed_share() const noexcept {
-    constexpr double usual_share = 0.5;
-    return std::min(1.0, told / (period * usual_share));
+    constexpr double usual_share = 0.5, for_missing = 0.2;
+    return std::min(1.0, told / (period * usual_share)) * (1.0 - for_missing * missing());
+  }
+  /// Distance to position limits that such an arm keeps beside the margin of the settings [rad | m].
+  double inside() const noexcept {
+    constexpr double for_missing = 0.002;
+    return for_missing * missing();
   }
   /// Time by which a reference whose velocities are held for the period leads an arm that moves on in periods of the settings.
   double lead() const noexcept { return 0.5 * (period - told); }

@@ -155,7 +155,7 @@ BOOST_AUTO_TEST_CASE(one_row_is_appended_of_the_height_as_it_is) {
   const SecondState second{};
   const SpeedLimitNow speed{};
   const Survey found{};
-  const Moment now{0.001, 1.0, 0.001, q, v, nullptr, nullptr, 1.0, false, last, nullptr, second, speed, found};
+  const Moment now{0.001, 1.0, 0.0, 0.001, q, v, nullptr, nullptr, 1.0, false, last, nullptr, second, speed, found};
   RowBlock rows(constraint.max_rows(), nv, constraint.priority());
   Bounds bounds(nv);
   constraint.append(now, bounds, rows);

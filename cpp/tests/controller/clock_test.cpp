@@ -173,3 +173,44 @@ BOOST_AUTO_TEST_CASE(an_arm_whose_torques_change_rarely_is_slower_below_half_of_
   tick.period = 0.008;
   BOOST_TEST(is(tick.speed_share(), 0.25));
 }
+
+BOOST_AUTO_TEST_CASE(an_arm_whose_torques_get_lost_is_slower) {
+  // Every tenth step is missing, after a while; then none is.
+  Clock clock(clock_period, false);
+  double now = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    now += k % 9 == 8 ? 2 * clock_period : clock_period;
+    BOOST_TEST(clock.advance(now, {}).period == clock_period);
+  }
+  BOOST_TEST(std::abs(clock.tick().missed_share - 0.1) < 0.005);
+  BOOST_TEST(std::abs(clock.tick().speed_share() - 0.8) < 0.02);
+  BOOST_TEST(std::abs(clock.tick().inside() - 0.002) < 0.0002);
+  BOOST_TEST(clock.explain() == "10 % of the steps are missing");
+  for (int k = 0; k < 2000; ++k) {
+    now += clock_period;
+    clock.advance(now, {});
+  }
+  BOOST_TEST(clock.tick().missed_share < 0.015);  // e^-2 of it
+  BOOST_TEST(clock.tick().speed_share() == 1.0);
+  BOOST_TEST(clock.tick().inside() == 0.0);
+  BOOST_TEST(clock.explain().empty());
+}
+
+BOOST_AUTO_TEST_CASE(slow_loops_pauses_and_rare_late_steps_are_no_losses) {
+  Clock slow(clock_period, false), rests(clock_period, false), rare(clock_period, false);
+  double now = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    slow.advance(now += 2 * clock_period, {});
+  }
+  BOOST_TEST(slow.tick().missed_share < 0.01);  // of the first two, until its period is measured
+  BOOST_TEST(slow.tick().speed_share() == 1.0);
+  rests.advance(0.0, {});
+  rests.advance(1.0, {});
+  BOOST_TEST(rests.tick().missed_share == 0.0);
+  now = 0.0;
+  for (int k = 0; k < 2000; ++k) {  // 1 %
+    rare.advance(now += k % 99 == 98 ? 2 * clock_period : clock_period, {});
+  }
+  BOOST_TEST(rare.tick().missed_share < 0.02);
+  BOOST_TEST(rare.tick().speed_share() == 1.0);
+}

@@ -31,7 +31,7 @@ class JointLimitConstraint : public Constraint {
   void widen_to_overruns(const Moment& now, Bounds& bounds) const noexcept;
 
   JointLimits limits_;
-  JointLimits slower_;  // Limits with the velocities of this solve.
+  JointLimits tighter_;  // Limits of this solve.
   JointLimitSettings settings_;
 };
 
