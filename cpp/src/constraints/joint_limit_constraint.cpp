@@ -15,9 +15,10 @@ JointLimitConstraint::JointLimitConstraint(JointLimits limits, JointLimitSetting
 void JointLimitConstraint::append(const Moment& now, Bounds& bounds, RowBlock&) noexcept {
   const LastCommand& last = now.last;
   tighter_.velocity = now.speed_share * limits_.velocity;
-  constexpr double most = 0.25;  // of a joint's way
+  constexpr double most = 0.25;  // of the way between a joint's limits
   for (Eigen::Index i = 0; i < tighter_.lower.size(); ++i) {
-    const double inside = std::min(now.inside, most * (limits_.upper[i] - limits_.lower[i]));
+    const double way = std::isfinite(limits_.velocity[i]) ? now.inside * limits_.velocity[i] : 0.0;
+    const double inside = std::min(way, most * (limits_.upper[i] - limits_.lower[i]));
     tighter_.lower[i] = limits_.lower[i] + inside;
     tighter_.upper[i] = limits_.upper[i] - inside;
   }
@@ -65,7 +66,7 @@ void JointLimitConstraint::widen_to_overruns(const Moment& now, Bounds& bounds) 
   for (Eigen::Index i = 0; i < now.position.size(); ++i) {
     const double position = now.position[i], velocity = now.velocity[i];
     const double most = std::max(settings_.acceleration_overrun, now.last.acceleration_factor) * limits_.acceleration[i];
-    const double fastest = settings_.velocity_overrun * limits_.velocity[i];
+    const double fastest = settings_.velocity_overrun * tighter_.velocity[i];
     double upper = std::clamp((fastest - velocity) / now.period, -most, most);
     double lower = std::clamp((-fastest - velocity) / now.period, -most, most);
     const double jerk = now.jerk_share * limits_.jerk[i];

@@ -18,7 +18,8 @@ constexpr double most_uncounted = 0.5;       // jitter that the reference does n
 constexpr double steadiness = 0.15;          // change of the measured period that is jitter, as a share of it [-]
 constexpr double most_missed_at_once = 1e8;  // missed periods that are counted of one step
 constexpr double recall = 1.0;               // over which the share of missing steps is taken [s]
-constexpr double said_from = 0.05;           // share of missing steps that is said [-]
+constexpr double at_once = 0.01;    // most that one step counts of it: a single stall is no connection that loses steps [s]
+constexpr double said_from = 0.05;  // share of missing steps that is said [-]
 
 double in_seconds(std::chrono::steady_clock::duration duration) noexcept {
   return std::chrono::duration<double>(duration).count();
@@ -140,7 +141,7 @@ void Clock::count(double elapsed) noexcept {
   }
   if (!t.gap) {  // a pause says nothing of what comes after it
     const double missing = elapsed > late_from * t.expected ? 1.0 - t.expected / elapsed : 0.0;
-    t.missed_share += std::min(1.0, elapsed / recall) * (missing - t.missed_share);
+    t.missed_share += std::min(elapsed, at_once) / recall * (missing - t.missed_share);
   }
 }
 

@@ -46,9 +46,9 @@ struct Tick {
     constexpr double usual_share = 0.5, for_missing = 0.2;
     return std::min(1.0, told / (period * usual_share)) * (1.0 - for_missing * missing());
   }
-  /// Distance to position limits that such an arm keeps beside the margin of the settings [rad | m].
+  /// Way that such an arm stays away from position limits, beside the margin of the settings: as time at the velocity limit [s].
   double inside() const noexcept {
-    constexpr double for_missing = 0.002;
+    constexpr double for_missing = 0.8e-3;
     return for_missing * missing();
   }
   /// Time by which a reference whose velocities are held for the period leads an arm that moves on in periods of the settings.

@@ -21,7 +21,7 @@ constexpr double free_share = 0.2;       // share of the largest error from whic
 constexpr double prismatic_share = 0.2;  // the same of prismatic joints, as a share of that [m/rad]
 constexpr double rate_rounding = 1e-9;   // relative excess of a torque's largest change that is rounding of the program [-]
 constexpr double most_per_period = 0.2;  // feedback's frequency × period, at most: a slow rate holds its torques for long [-]
-constexpr double softer = 3.0;           // by which feedback's frequency is lower where many steps are missing [-]
+constexpr double softer = 2.0;           // by which feedback's frequency is lower where many steps are missing [-]
 // Time constant of the filter of the way back of a velocity stream: noise of the position must not reach its jerk [s].
 constexpr double drift_filter = 0.05;
 
@@ -50,7 +50,8 @@ Tracker::Tracker(const Robot& robot, const JointKinds& joints, const ControllerS
 }
 
 double Tracker::largest_frequency(const Tick& tick) const noexcept {
-  return std::min(settings_.tracking.frequency, most_per_period / tick.period) / (1.0 + (softer - 1.0) * tick.missing());
+  const double soft = is_impedance() ? 1.0 : 1.0 + (softer - 1.0) * tick.missing();  // a stiffness is kept
+  return std::min(settings_.tracking.frequency, most_per_period / tick.period) / soft;
 }
 
 void Tracker::write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q, const Tick& tick,

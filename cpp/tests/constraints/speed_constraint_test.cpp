@@ -36,7 +36,7 @@ struct SpeedRows {
     rows.clear();
     const SpeedLimitNow speed{&state, &limits.acceleration, limit, next_limit};
     constraint.append(
-        {speed_period, 1.0, speed_period, state.v(), state.v(), nullptr, nullptr, 1.0, false, {}, nullptr, {}, speed, {}},
+        {speed_period, 1.0, 0.0, speed_period, state.v(), state.v(), nullptr, nullptr, 1.0, false, {}, nullptr, {}, speed, {}},
         bounds, rows);
   }
   SpeedConstraint constraint;

@@ -63,9 +63,9 @@ struct Survey {
 
 /// All that a constraint may read of one solve.
 struct Moment {
-  double period;       ///< Time for which the acceleration is held [s].
-  double speed_share;  ///< Share of the velocity limits that torques leave which change rarely, in (0, 1].
-  double inside;  ///< Distance by which position limits are moved inwards then, beside the margin of the settings [rad | m].
+  double period;         ///< Time for which the acceleration is held [s].
+  double speed_share;    ///< Share of the velocity limits that torques leave which change rarely, in (0, 1].
+  double inside;         ///< Time at the velocity limits by whose way position limits move inwards then, beside the margin [s].
   double torque_period;  ///< Time whose change of torque may be made at once, at most as long [s].
   const Eigen::VectorXd& position;
   const Eigen::VectorXd& velocity;

@@ -57,8 +57,7 @@ struct MotionPeriods {
   double coming = 0.0;  ///< Until the next solve [s]; 0: the period of the settings.
   double torque = 0.0;  ///< Time whose change of torque may be made at once [s]; 0: the coming period.
   double speed = 1.0;   ///< Share of the velocity limits for joints where some torque has a rate, in (0, 1].
-  double inside =
-      0.0;  ///< Distance by which their position limits are moved inwards, beside the margin of the settings [rad | m].
+  double inside = 0.0;  ///< Time at the velocity limit by whose way their position limits move inwards, beside the margin [s].
 };
 
 /// Input of one solve.
