@@ -112,9 +112,10 @@ ProgramStatus MotionProgram::solve(const MotionRequest& request, MotionSolution&
   Survey found;
   const MotionPeriods& periods = request.periods;
   const double period = periods.coming > 0.0 ? periods.coming : settings_.period;
+  const bool torque_has_rate = effort_has_rate_ && settings_.by_torque;
   const Moment now{period,
-                   effort_has_rate_ && settings_.by_torque ? periods.speed : 1.0,
-                   effort_has_rate_ && settings_.by_torque ? periods.inside : 0.0,
+                   torque_has_rate ? periods.speed : 1.0,
+                   torque_has_rate ? periods.inside : 0.0,
                    periods.torque > 0.0 ? std::min(periods.torque, period) : period,
                    position_,
                    velocity_,
