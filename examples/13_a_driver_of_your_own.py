@@ -17,12 +17,9 @@ class JsonRobot:
     """Reads q and v from a robot, and sends it positions."""
 
     def __init__(self, address, arm):
+        joints, limits = arm.robot.coordinate_names, arm.limits
         self.description = ss.drivers.RobotDescription(
-            "JSON robot",
-            period=PERIOD,
-            outputs=["position"],
-            joints=arm.robot.coordinate_names,
-            limits=arm.limits,
+            "JSON robot", period=PERIOD, outputs=["position"], joints=joints, limits=limits
         )
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(address)
@@ -38,9 +35,11 @@ class JsonRobot:
             while True:
                 self._socket.settimeout(0.0 if state else timeout)
                 state = json.loads(self._socket.recv(4096))
-        if state and state["fault"]:
+        if state is None:
+            return None
+        if state["fault"]:
             raise ss.drivers.RobotStopped(state["fault"])
-        return state and ss.drivers.RobotState(state["q"], state["v"], time=time.monotonic())
+        return ss.drivers.RobotState(state["q"], state["v"], time=time.monotonic())
 
     def write(self, command):
         self._send(position=command.position.tolist())
