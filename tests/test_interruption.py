@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -17,6 +16,7 @@ from sidestep._core import PlanStatus
 from sidestep.planning import PathPlanner, PlannerSettings
 from sidestep.system import GeometricSystem
 from support import planar_problems
+from support.programs import program
 
 pytestmark = pytest.mark.slow
 
@@ -88,9 +88,7 @@ print("goes on", flush=True)
 @pytest.mark.parametrize("name", LONG)
 def test_ctrl_c_ends_what_takes_long(name):
     source = PROGRAM.replace("{work}", LONG[name])
-    with subprocess.Popen(
-        [sys.executable, "-c", source], stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent
-    ) as process:
+    with program([sys.executable, "-c", source], cwd=Path(__file__).parent) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begins\n"
         time.sleep(0.3)
@@ -99,7 +97,7 @@ def test_ctrl_c_ends_what_takes_long(name):
         assert process.stdout.readline() == "interrupted\n"
         assert time.monotonic() - begin < 5.0  # 0.1 s on a machine that is free; the work takes far longer
         assert process.stdout.readline() == "goes on\n"
-    assert process.returncode == 0
+        assert process.wait(60.0) == 0
 
 
 def test_a_handler_that_does_not_raise_does_not_end_the_work():

@@ -23,8 +23,10 @@ from sidestep._core import RobotPort
 from sidestep.cli.serve_command import loop_settings, open_driver, output_for, perception_of, serve_runs
 from sidestep.drivers import RobotDescription, RobotState
 from sidestep.link import Server
+from sidestep.loop.child_process import hearing_ctrl_c
 from sidestep.perception.camera_file import write_camera
 from sidestep.perception.camera_record import CameraRecord
+from support.programs import program
 
 GOAL = [0.4, 0.5, -0.3]
 
@@ -34,21 +36,15 @@ def address(tmp_path: Path) -> str:
     return str(tmp_path / "arm.sock")
 
 
-def hear_interrupts() -> None:
-    """A program hears Ctrl-C also where the tests' own processes are made deaf to it."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 @pytest.fixture
 def serving(address: str) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", "sidestep", "serve", "planar3", "--address", address]
     command += ["--output", "position", "--free", "--longest-gap", "10"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=hear_interrupts) as process:
+    with program(hearing_ctrl_c(command)) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
         assert line.startswith(f"serving 'planar3' at unix:{address}; token: "), line
         yield process
-        process.kill()
 
 
 @pytest.mark.slow

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +15,7 @@ import sidestep as ss
 from sidestep.drivers import UR, RobotState, RobotStopped
 from sidestep.drivers.ur_stand_in.process import StandInProcess
 from sidestep.loop import RunEnd
+from support.programs import program
 
 pytest.importorskip("rtde_control", reason="needs ur-rtde, which has no package for this system")
 
@@ -225,15 +224,12 @@ while True:
 
 
 def test_a_client_that_is_killed_leaves_an_arm_that_brakes(robot: StandInProcess) -> None:
-    client = subprocess.Popen([sys.executable, "-c", CLIENT, ADDRESS], stdout=subprocess.PIPE)
-    assert client.stdout is not None
-    assert client.stdout.readline() == b"moves\n"
-    time.sleep(0.3)
-    told = robot.tell()
+    with program([sys.executable, "-c", CLIENT, ADDRESS]) as client:
+        assert client.stdout is not None
+        assert client.stdout.readline() == "moves\n"
+        time.sleep(0.3)
+        told = robot.tell()
     assert told["velocity"][0] == pytest.approx(0.5, abs=0.01)
-    client.send_signal(signal.SIGKILL)
-    client.wait()
-    client.stdout.close()
     time.sleep(0.5)
     after = robot.tell()
     assert any("the watchdog ended the program" in line for line in robot.log)

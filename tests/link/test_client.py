@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import signal
 import stat
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 
 import sidestep as ss
 from sidestep.link import Client, ConnectionLost, Server
+from support.programs import program
 from support.served_arm import Served
 
 GOAL = np.array([0.4, 0.5, -0.3])
@@ -178,7 +178,7 @@ def test_without_the_token_a_client_only_looks(served: Served) -> None:
 
 
 def test_a_client_that_is_killed_leaves_the_arm_at_rest(served: Served) -> None:
-    program = f"""
+    code = f"""
 import sidestep as ss, time
 client = ss.connect({served.address!r})
 client.take_command()
@@ -186,7 +186,7 @@ client.set_goal({GOAL.tolist()})
 print("moves", flush=True)
 time.sleep(60)
 """
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+    with program([sys.executable, "-c", code]) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "moves\n"
         process.kill()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 import struct
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ import pytest
 import sidestep as ss
 from sidestep.link import ZenohBridge, link_version
 from sidestep.link.core import link_magic
+from support.programs import program
 from support.served_arm import Served
 
 zenoh = pytest.importorskip("zenoh")
@@ -74,14 +74,14 @@ def test_without_the_token_a_client_only_looks(served: Served, endpoint: str) ->
 
 
 def test_a_client_that_is_killed_is_given_up(served: Served, endpoint: str) -> None:
-    program = f"""
+    code = f"""
 import sidestep as ss, time
 client = ss.connect("zenoh/planar", {token(served)!r}, endpoint={endpoint!r}, name="lost")
 client.take_command()
 print("in command", flush=True)
 time.sleep(60)
 """
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+    with program([sys.executable, "-c", code]) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "in command\n"
         with ss.connect(served.address) as watcher:
@@ -94,8 +94,11 @@ time.sleep(60)
 
 def test_whoever_listens_gets_cycles(served: Served, endpoint: str) -> None:
     with looker(endpoint) as session:
-        listener = session.declare_subscriber("sidestep/planar/cycle")
-        assert bytes(listener.recv().payload)[:4] == b"SDST"
+        cycles: list[Any] = []
+        listener = session.declare_subscriber("sidestep/planar/cycle", cycles.append)
+        assert comes_true(lambda: len(cycles) > 0)
+        assert bytes(cycles[0].payload)[:4] == b"SDST"
+        listener.undeclare()
 
 
 def test_nobody_ends_the_cycles_of_others(served: Served, endpoint: str) -> None:

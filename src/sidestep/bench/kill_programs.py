@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sidestep._core import SimulatorDriver
 from sidestep.link import Client, connect
-from sidestep.loop.child_process import end_process
+from sidestep.loop.child_process import end_process, hearing_ctrl_c
 
 Array = npt.NDArray[np.float64]
 
@@ -106,7 +106,7 @@ class Programs:
     def _open(self, name: str, words: list[str]) -> subprocess.Popen[bytes]:
         with (self.folder / f"{name}.log").open("wb") as log:
             process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, preexec_fn=_hear_ctrl_c
+                hearing_ctrl_c(words), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
             )
         self.processes[name] = process
         return process
@@ -150,11 +150,6 @@ class Programs:
         """Ends all programs."""
         for process in self.processes.values():
             end_process(process, LONGEST_END)
-
-
-def _hear_ctrl_c() -> None:
-    """In a new process: who runs in the background is deaf to Ctrl-C, and so are its children."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @contextmanager
