@@ -1,6 +1,7 @@
 #include "sidestep/perception/steady_depth.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -48,55 +49,84 @@ void SteadyDepth::add(const DepthCamera& camera, const DepthImage& image) noexce
   SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)().steady(
       rule, image.depth(), reinterpret_cast<const unsigned char*>(image.labels()), static_cast<int>(image.size()), mean_.data(),
       images_.data(), drift_.data(), steady_.data());
-  begin_moving_tiles(image);
+  follow_tiles(rule, image);
 }
 
-void SteadyDepth::begin_moving_tiles(const DepthImage& image) noexcept {
-  const int height = image.height(), across = tiles_across(width_);
+void SteadyDepth::follow_tiles(const kernels::SteadyRule& rule, const DepthImage& image) noexcept {
+  const float limit = find_tiles(image);
+  const int across = tiles_across(width_);
+  for (int top = 0; top < image.height(); top += tile) {
+    for (int left = 0; left < width_; left += tile) {
+      if (tiles_[static_cast<std::size_t>(top / tile * across + left / tile)] > limit) {
+        follow(rule, image, left, top);
+      }
+    }
+  }
+}
+
+float SteadyDepth::find_tiles(const DepthImage& image) noexcept {
+  const std::size_t width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(image.height());
   const PixelLabel* const labels = image.labels();
-  const auto has_mean = [&](std::size_t i) { return labels[i] == PixelLabel::obstacle && images_[i] > 1.0f; };
-  std::size_t num = 0;
-  for (int top = 0; top < height; top += tile) {
+  std::size_t next = 0, num = 0;
+  for (std::size_t top = 0; top < height; top += tile) {
     std::fill(sums_.begin(), sums_.end(), 0.0f);
     std::fill(counts_.begin(), counts_.end(), 0.0f);
-    for (int v = top; v < std::min(top + tile, height); ++v) {
-      const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_);
-      for (std::size_t u = 0; u < static_cast<std::size_t>(width_); ++u) {
-        const float share = has_mean(row + u) ? 1.0f : 0.0f;
-        sums_[u] += share * drift_[row + u];
+    for (std::size_t v = top; v < std::min(top + tile, height); ++v) {
+      for (std::size_t u = 0; u < width; ++u) {
+        const float share = has_mean(labels, v * width + u) ? 1.0f : 0.0f;
+        sums_[u] += share * drift_[v * width + u];
         counts_[u] += share;
       }
     }
-    for (int k = 0; k < across; ++k) {
-      const auto first = static_cast<std::ptrdiff_t>(k * tile);
-      const float sum = std::accumulate(sums_.begin() + first, sums_.begin() + first + tile, 0.0f),
-                  count = std::accumulate(counts_.begin() + first, counts_.begin() + first + tile, 0.0f);
-      const float mean = count >= least_in_tile ? std::abs(sum) / count : 0.0f;
-      tiles_[static_cast<std::size_t>(top / tile * across + k)] = mean;
+    for (auto sum = sums_.begin(), count = counts_.begin(); sum != sums_.end(); sum += tile, count += tile) {
+      const float pixels = std::accumulate(count, count + tile, 0.0f);
+      const float mean = pixels < least_in_tile ? 0.0f : std::abs(std::accumulate(sum, sum + tile, 0.0f)) / pixels;
+      tiles_[next++] = mean;
       if (mean > 0.0f) {
         sorted_tiles_[num++] = mean;
       }
     }
   }
-  if (num == 0) {
-    return;
-  }
   const auto middle = sorted_tiles_.begin() + static_cast<std::ptrdiff_t>(num / 2);
   std::nth_element(sorted_tiles_.begin(), middle, sorted_tiles_.begin() + static_cast<std::ptrdiff_t>(num));
-  const float limit = std::clamp(beyond_most * *middle, least_drift, enough_drift);
-  for (int v = 0; v < height; ++v) {
-    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_);
-    for (int u = 0; u < width_; ++u) {
-      const std::size_t i = row + static_cast<std::size_t>(u);
-      if (tiles_[static_cast<std::size_t>(v / tile * across + u / tile)] > limit && has_mean(i)) {
-        const float z = image.depth()[i];
-        mean_[i] += 0.5f * (z - mean_[i]);
-        images_[i] = 2.0f;
-        drift_[i] = 0.0f;
-        steady_[i] = z;
+  return num == 0 ? least_drift : std::clamp(beyond_most * *middle, least_drift, enough_drift);
+}
+
+void SteadyDepth::follow(const kernels::SteadyRule& rule, const DepthImage& image, int left, int top) noexcept {
+  std::array<std::size_t, tile * tile> pixels;
+  std::size_t num = 0;
+  float mean = 0.0f;  // difference of the tile [sigma]
+  for (int v = top; v < std::min(top + tile, image.height()); ++v) {
+    for (int u = left; u < std::min(left + tile, width_); ++u) {
+      const std::size_t i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u);
+      if (has_mean(image.labels(), i)) {
+        pixels[num++] = i;
+        mean += drift_[i];
       }
     }
   }
+  mean /= static_cast<float>(num);
+  // What moves is where most of the pixels are that differ as the tile does; another surface in the tile may rest.
+  std::array<float, tile * tile> depths{};
+  std::size_t num_moving = 0;
+  for (std::size_t k = 0; k < num; ++k) {
+    if (drift_[pixels[k]] * mean > 0.5f * mean * mean) {
+      depths[num_moving++] = mean_[pixels[k]];
+    }
+  }
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(num_moving / 2);
+  std::nth_element(depths.begin(), middle, depths.begin() + static_cast<std::ptrdiff_t>(num_moving));
+  const float noise = rule.constant + rule.quadratic * *middle * *middle;
+  const auto end = std::remove_if(pixels.begin(), pixels.begin() + static_cast<std::ptrdiff_t>(num),
+                                  [&](std::size_t i) { return std::abs(mean_[i] - *middle) > rule.jump * noise; });
+  float way = 0.0f;
+  std::for_each(pixels.begin(), end, [&](std::size_t i) { way += image.depth()[i] - mean_[i]; });
+  way /= static_cast<float>(end - pixels.begin());
+  std::for_each(pixels.begin(), end, [&](std::size_t i) {
+    mean_[i] += way;
+    drift_[i] = 0.0f;
+    steady_[i] = images_[i] >= rule.least ? mean_[i] : image.depth()[i];
+  });
 }
 
 void SteadyDepth::forget() noexcept { std::fill(images_.begin(), images_.end(), 0.0f); }

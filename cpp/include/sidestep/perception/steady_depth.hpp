@@ -7,6 +7,9 @@
 #include "sidestep/perception/depth_image.hpp"
 
 namespace sidestep {
+namespace kernels {
+struct SteadyRule;
+}
 
 /// Depths of a camera that stands still, with less noise: each pixel that shows an obstacle has the mean m of its last images.
 ///
@@ -16,8 +19,9 @@ namespace sidestep {
 /// n = 5 the depth itself counts. So a surface that moves by 1 sigma or more from image to image is not averaged, and a slower one is shown
 /// less than 2 sigma behind where it is.
 ///
-/// Neighbours see a slow motion sooner than one pixel: where the differences of a tile of 8 x 8 pixels have a mean that is six times as
-/// large as that of most tiles, and 0.25 sigma, all of it moves. A surface as large as a tile is so shown less than 0.8 sigma behind.
+/// Neighbours see a slow motion sooner than one pixel, and together they see its way. Where the mean difference of a tile of 8 x 8
+/// pixels is six times as large as that of most tiles and 0.25 sigma, or 0.8 sigma, the surface in it moves: its means are shifted by
+/// the mean of z - m. One as large as a tile is so shown less than 0.6 sigma behind.
 class SteadyDepth {
  public:
   SteadyDepth(const DepthCamera& camera, int most_images);
@@ -28,8 +32,15 @@ class SteadyDepth {
   const float* depth() const noexcept { return steady_.data(); }  ///< [m], of the pixels of the last image
 
  private:
-  /// Lets the means of tiles that move as a whole begin anew.
-  void begin_moving_tiles(const DepthImage& image) noexcept;
+  bool has_mean(const PixelLabel* labels, std::size_t i) const noexcept {
+    return labels[i] == PixelLabel::obstacle && images_[i] > 1.0f;
+  }
+  /// Shifts the means of tiles whose surface moves.
+  void follow_tiles(const kernels::SteadyRule& rule, const DepthImage& image) noexcept;
+  /// Finds the mean difference of each tile [sigma]; returns that from which on a tile moves.
+  float find_tiles(const DepthImage& image) noexcept;
+  /// Shifts the means of the surface in one tile that moves.
+  void follow(const kernels::SteadyRule& rule, const DepthImage& image, int left, int top) noexcept;
 
   float most_;
   int width_;
