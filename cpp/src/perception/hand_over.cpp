@@ -14,6 +14,8 @@ constexpr double ever = std::numeric_limits<double>::infinity();
 constexpr double border_period = 0.2;    // Time between two searches for the border of unseen space [s].
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
+constexpr double counts_beside = 0.35;   // Age up to which a motion counts for what another camera shows [s],
+constexpr double beside = 0.1;           // so near to the box of what moves [m]: cameras see neither sides of it nor its edges.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 }  // namespace
@@ -145,14 +147,60 @@ void Perception::Impl::find_velocities(View& view, double time) {
   }
 }
 
-Obstacles Perception::Impl::moving_balls(View& view, double time) {
-  find_velocities(view, time);
-  Obstacles all = balls(shown, true);
+void Perception::Impl::find_movers(std::size_t number, double time) {
+  movers.clear();
+  for (std::size_t n = 0; n < map.voxels().size(); ++n) {
+    const Voxel& voxel = map.voxels()[n];
+    const double age = time - voxel.last;
+    if (voxel.cell < 0 || !voxel.counts || !voxel.moves || voxel.camera == number || std::abs(age) > counts_beside ||
+        is_excluded[n] != 0) {
+      continue;
+    }
+    const Eigen::Vector3d now = voxel.frame_middle() + age * velocities[n].cast<double>();
+    const auto known = std::find_if(movers.begin(), movers.end(),
+                                    [&](const Mover& mover) { return velocities[mover.voxel] == velocities[n]; });
+    if (known == movers.end()) {
+      movers.push_back({n, Eigen::AlignedBox3d(now)});
+    } else {
+      known->box.extend(now);
+    }
+  }
+  for (Mover& mover : movers) {
+    mover.box.min().array() -= beside;
+    mover.box.max().array() += beside;
+  }
+  std::sort(movers.begin(), movers.end(), [&](const Mover& one, const Mover& other) {  // what was seen last has the last word
+    return map.voxels()[one.voxel].last > map.voxels()[other.voxel].last;
+  });
+}
+
+Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
+  find_velocities(views[number], time);
+  find_movers(number, time);
+  std::vector<int> handed = shown;
+  std::vector<std::size_t> moves_as(shown.begin(), shown.end());
+  for (const int index : fresh) {
+    const auto n = static_cast<std::size_t>(index);
+    const auto mover = std::find_if(movers.begin(), movers.end(), [&](const Mover& one) {
+      return !map.voxels()[n].moves && one.box.contains(map.voxels()[n].frame_middle());
+    });
+    if (mover != movers.end()) {
+      handed.push_back(index);
+      moves_as.push_back(mover->voxel);
+    }
+  }
+  const Obstacles all = balls(handed, true);
+  if (std::none_of(moves_as.begin(), moves_as.end(), [&](std::size_t n) { return map.voxels()[n].moves; })) {
+    return all;
+  }
+  Eigen::Matrix3Xd speeds(3, all.size());
   Eigen::VectorXd uncertainty(all.size());
   for (Eigen::Index n = 0; n < all.size(); ++n) {
-    uncertainty[n] = static_cast<double>(uncertainties[static_cast<std::size_t>(shown[static_cast<std::size_t>(n)])]);
+    const std::size_t as = moves_as[static_cast<std::size_t>(n)];
+    speeds.col(n) = velocities[as].cast<double>();
+    uncertainty[n] = static_cast<double>(uncertainties[as]);
   }
-  return all.size() > 0 && uncertainty.maxCoeff() > 0.0 ? all.moving(all.velocities(), std::move(uncertainty)) : all;
+  return all.moving(std::move(speeds), std::move(uncertainty));
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
@@ -189,7 +237,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     last_remembered.swap(remembered);
   }
   View& view = views[number];
-  controller.set_obstacles(moving_balls(view, time), {view.camera.name, time, settings.valid_for, true});
+  controller.set_obstacles(moving_balls(number, time), {view.camera.name, time, settings.valid_for, true});
   report.seen = static_cast<int>(shown.size());
   report.remembered = static_cast<int>(last_remembered.size());
   report.unseen = static_cast<int>(border.cols());

@@ -52,6 +52,12 @@ struct Perception::Impl {
     bool is_explained = false;
   };
 
+  /// What moves in one piece: one of its voxels, and where it is.
+  struct Mover {
+    std::size_t voxel;
+    Eigen::AlignedBox3d box;
+  };
+
   Impl(Controller& controller, const std::vector<DepthCamera>& cameras, const PerceptionSettings& settings);
 
   std::size_t index(const std::string& camera) const;
@@ -71,8 +77,11 @@ struct Perception::Impl {
   Obstacles balls(const std::vector<int>& chosen, bool moved) const;
   /// Finds the velocities of what a camera shows now and has not rested.
   void find_velocities(View& view, double time);
-  /// What a camera shows, with velocities.
-  Obstacles moving_balls(View& view, double time);
+  /// Finds what other cameras than one see moving, where it is at a time [s].
+  void find_movers(std::size_t number, double time);
+  /// What a camera shows, with velocities. What it cannot tell to move beside what another camera sees moving comes twice: at rest, and
+  /// with that velocity.
+  Obstacles moving_balls(std::size_t number, double time);
   /// Takes what other sources say, where it was at a time [s].
   void find_told(double time);
   bool is_explained(std::size_t voxel);
@@ -98,6 +107,7 @@ struct Perception::Impl {
   std::uint64_t told_version = 0;                      // Sum of their versions.
   std::vector<Tested> tested;                          // one per voxel
   std::vector<int> fresh;                              // Voxels that a camera shows and that may move, in work.
+  std::vector<Mover> movers;                           // What other cameras see moving, in work.
   std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
   std::vector<int> last_remembered;                    // The latter, as the controller has them.
   std::vector<Eigen::Vector3f> velocities;             // Per voxel, as the last image that showed it says [m/s].

@@ -181,6 +181,41 @@ BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
              0.2);  // cells of 2 cm stand still, images 12 cm apart are compared
 }
 
+BOOST_FIXTURE_TEST_CASE(what_one_camera_sees_moving_moves_for_the_other_that_shows_its_back, Watched) {
+  camera.fx = camera.fy = 200.0;
+  DepthCamera back = test::small_camera({-1.6, 0.2, 0.9}, {0.0, 0.0, 0.6});
+  back.name = "back";
+  back.fx = back.fy = 200.0;
+  perception = std::make_unique<Perception>(controller, std::vector{camera, back}, settings);
+  step();
+  scene.floor = -10.0;
+  const Eigen::Vector3d begin = scene.balls.front().centre;
+  scene.balls.front().centre.x() = 20.0;
+  const auto look_back = [&] {
+    const std::vector<float> pixels = scene.image(back);
+    perception->update("back", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  };
+  look_back();  // what a first image shows may rest
+  for (int n = 0; n < 15; ++n) {
+    scene.balls.front().centre = begin - Eigen::Vector3d(0.0, 0.5 * 0.03 * n, 0.0);
+    look();
+  }
+  time -= 0.03;
+  look_back();  // one image tells no velocity
+  const auto shown = said("back");
+  BOOST_TEST_REQUIRE(shown != nullptr);
+  int resting = 0, moving = 0;
+  for (Eigen::Index n = 0; n < shown->size(); ++n) {
+    if ((shown->points().col(n) - scene.balls.front().centre).norm() < 0.17) {
+      const Eigen::Vector3d velocity = shown->velocities().col(n);
+      resting += velocity.isZero(0.0) ? 1 : 0;
+      moving += velocity.y() < -0.25 ? 1 : 0;
+    }
+  }
+  BOOST_TEST(resting > 20);          // it may rest beside what moves,
+  BOOST_TEST(moving > resting / 2);  // and may go with it
+}
+
 BOOST_FIXTURE_TEST_CASE(images_come_while_steps_go_on, Watched) {
   start();
   step();
