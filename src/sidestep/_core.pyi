@@ -4451,7 +4451,8 @@ class Perception:
     def cells(self) -> dict[str, numpy.typing.NDArray[Any]]:
         """
         The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
-        no camera shows it now, hidden (N,): something is in front of it.
+        no camera shows it now, hidden (N,): something is in front of it. What is beside something that another camera sees moving was told a
+        second time, with that velocity.
         """
 
     def unseen(self) -> numpy.typing.NDArray[numpy.float64]:
