@@ -20,6 +20,9 @@ constexpr float beyond_most = 6.0f;         // Ratio of its difference to that o
 constexpr float least_drift = 0.25f;        // and that difference, at least,
 constexpr float enough_drift = 0.8f;        // and in any case [sigma].
 
+float constant_noise(const DepthCamera& camera) noexcept { return static_cast<float>(camera.noise.constant) + least_noise; }
+float quadratic_noise(const DepthCamera& camera) noexcept { return static_cast<float>(camera.noise.quadratic); }
+
 int tiles_across(int pixels) noexcept { return (pixels + tile - 1) / tile; }
 
 }  // namespace
@@ -39,8 +42,8 @@ SteadyDepth::SteadyDepth(const DepthCamera& camera, int most_images)
 
 void SteadyDepth::add(const DepthCamera& camera, const DepthImage& image) noexcept {
   static_assert(sizeof(PixelLabel) == 1);
-  const kernels::SteadyRule rule{static_cast<float>(camera.noise.constant) + least_noise,
-                                 static_cast<float>(camera.noise.quadratic),
+  const kernels::SteadyRule rule{constant_noise(camera),
+                                 quadratic_noise(camera),
                                  jump,
                                  drift,
                                  most_,
@@ -49,16 +52,16 @@ void SteadyDepth::add(const DepthCamera& camera, const DepthImage& image) noexce
   SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)().steady(
       rule, image.depth(), reinterpret_cast<const unsigned char*>(image.labels()), static_cast<int>(image.size()), mean_.data(),
       images_.data(), drift_.data(), steady_.data());
-  follow_tiles(rule, image);
+  follow_tiles(camera, image);
 }
 
-void SteadyDepth::follow_tiles(const kernels::SteadyRule& rule, const DepthImage& image) noexcept {
+void SteadyDepth::follow_tiles(const DepthCamera& camera, const DepthImage& image) noexcept {
   const float limit = find_tiles(image);
   const int across = tiles_across(width_);
   for (int top = 0; top < image.height(); top += tile) {
     for (int left = 0; left < width_; left += tile) {
       if (tiles_[static_cast<std::size_t>(top / tile * across + left / tile)] > limit) {
-        follow(rule, image, left, top);
+        follow(camera, image, left, top);
       }
     }
   }
@@ -92,7 +95,7 @@ float SteadyDepth::find_tiles(const DepthImage& image) noexcept {
   return num == 0 ? least_drift : std::clamp(beyond_most * *middle, least_drift, enough_drift);
 }
 
-void SteadyDepth::follow(const kernels::SteadyRule& rule, const DepthImage& image, int left, int top) noexcept {
+void SteadyDepth::follow(const DepthCamera& camera, const DepthImage& image, int left, int top) noexcept {
   std::array<std::size_t, tile * tile> pixels;
   std::size_t num = 0;
   float mean = 0.0f;  // difference of the tile [sigma]
@@ -116,16 +119,16 @@ void SteadyDepth::follow(const kernels::SteadyRule& rule, const DepthImage& imag
   }
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(num_moving / 2);
   std::nth_element(depths.begin(), middle, depths.begin() + static_cast<std::ptrdiff_t>(num_moving));
-  const float noise = rule.constant + rule.quadratic * *middle * *middle;
+  const float noise = constant_noise(camera) + quadratic_noise(camera) * *middle * *middle;
   const auto end = std::remove_if(pixels.begin(), pixels.begin() + static_cast<std::ptrdiff_t>(num),
-                                  [&](std::size_t i) { return std::abs(mean_[i] - *middle) > rule.jump * noise; });
+                                  [&](std::size_t i) { return std::abs(mean_[i] - *middle) > jump * noise; });
   float way = 0.0f;
   std::for_each(pixels.begin(), end, [&](std::size_t i) { way += image.depth()[i] - mean_[i]; });
   way /= static_cast<float>(end - pixels.begin());
   std::for_each(pixels.begin(), end, [&](std::size_t i) {
     mean_[i] += way;
     drift_[i] = 0.0f;
-    steady_[i] = images_[i] >= rule.least ? mean_[i] : image.depth()[i];
+    steady_[i] = images_[i] >= std::min(steady_after, most_) ? mean_[i] : image.depth()[i];
   });
 }
 

@@ -7,9 +7,6 @@
 #include "sidestep/perception/depth_image.hpp"
 
 namespace sidestep {
-namespace kernels {
-struct SteadyRule;
-}
 
 /// Depths of a camera that stands still, with less noise: each pixel that shows an obstacle has the mean m of its last images.
 ///
@@ -36,11 +33,11 @@ class SteadyDepth {
     return labels[i] == PixelLabel::obstacle && images_[i] > 1.0f;
   }
   /// Shifts the means of tiles whose surface moves.
-  void follow_tiles(const kernels::SteadyRule& rule, const DepthImage& image) noexcept;
+  void follow_tiles(const DepthCamera& camera, const DepthImage& image) noexcept;
   /// Finds the mean difference of each tile [sigma]; returns that from which on a tile moves.
   float find_tiles(const DepthImage& image) noexcept;
   /// Shifts the means of the surface in one tile that moves.
-  void follow(const kernels::SteadyRule& rule, const DepthImage& image, int left, int top) noexcept;
+  void follow(const DepthCamera& camera, const DepthImage& image, int left, int top) noexcept;
 
   float most_;
   int width_;
