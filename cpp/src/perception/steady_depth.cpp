@@ -25,6 +25,16 @@ float quadratic_noise(const DepthCamera& camera) noexcept { return static_cast<f
 
 int tiles_across(int pixels) noexcept { return (pixels + tile - 1) / tile; }
 
+/// Adds the differences of a row of pixels that have a mean, and their number, to those of their columns.
+void add_row(const PixelLabel* __restrict__ labels, const float* __restrict__ images, const float* __restrict__ drift,
+             std::size_t width, float* __restrict__ sums, float* __restrict__ counts) noexcept {
+  for (std::size_t u = 0; u < width; ++u) {
+    const float share = labels[u] == PixelLabel::obstacle && images[u] > 1.0f ? 1.0f : 0.0f;
+    sums[u] += share * drift[u];
+    counts[u] += share;
+  }
+}
+
 }  // namespace
 
 SteadyDepth::SteadyDepth(const DepthCamera& camera, int most_images)
@@ -69,17 +79,13 @@ void SteadyDepth::follow_tiles(const DepthCamera& camera, const DepthImage& imag
 
 float SteadyDepth::find_tiles(const DepthImage& image) noexcept {
   const std::size_t width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(image.height());
-  const PixelLabel* const labels = image.labels();
   std::size_t next = 0, num = 0;
   for (std::size_t top = 0; top < height; top += tile) {
     std::fill(sums_.begin(), sums_.end(), 0.0f);
     std::fill(counts_.begin(), counts_.end(), 0.0f);
     for (std::size_t v = top; v < std::min(top + tile, height); ++v) {
-      for (std::size_t u = 0; u < width; ++u) {
-        const float share = has_mean(labels, v * width + u) ? 1.0f : 0.0f;
-        sums_[u] += share * drift_[v * width + u];
-        counts_[u] += share;
-      }
+      add_row(image.labels() + v * width, images_.data() + v * width, drift_.data() + v * width, width, sums_.data(),
+              counts_.data());
     }
     for (auto sum = sums_.begin(), count = counts_.begin(); sum != sums_.end(); sum += tile, count += tile) {
       const float pixels = std::accumulate(count, count + tile, 0.0f);
