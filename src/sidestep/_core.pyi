@@ -4296,7 +4296,7 @@ class PerceptionSettings:
         memory [s], default 30.0, allowed 0 to inf: time for which something is kept that is hidden or out of view now; what moved, or was seen for less than 0.1 s, is kept for 0.3 s and ten times as long as it was seen: longer keeps more that is gone
         clear_after, default 2, allowed 1 to 10: number of images in a row that must see through a cell before what was there is gone: more is safer against flicker, and clears later
         least_pixels, default 3, allowed 1 to 100: number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it, the next or the one after it: more makes fewer ghosts, and shows thin things later
-        steady_images, default 8, allowed 1 to 100: number of images over which a camera that stands still averages the depth of what rests (1: none): more is smoother, and up to 2 sigma behind what moves slowly (by less than 1 sigma from image to image), 0.6 sigma if it is 8 pixels wide and high
+        steady_images, default 8, allowed 1 to 100: number of images over which a camera that stands still averages the depth of what rests (1: none): more is smoother, and up to 2 sigma behind what moves slowly (by less than 1 sigma from image to image), 0.9 sigma where it is 15 pixels wide and high
         unseen_is_free, default True, allowed 0 to 1: space that no camera has seen yet counts as free; without it the arm keeps clear of what nobody has looked at, and reaches less
         valid_for [s], default 0.25, allowed 0.001 to inf: age up to which the image of a camera is believed; then the arm stops until the next one comes: longer bridges more lost images
 
@@ -4451,8 +4451,8 @@ class Perception:
     def cells(self) -> dict[str, numpy.typing.NDArray[Any]]:
         """
         The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
-        no camera shows it now, hidden (N,): something is in front of it. What is beside something that another camera sees moving was told a
-        second time, with that velocity.
+        no camera shows it now, hidden (N,): something is in front of it. Beside what another camera sees moving
+        the controller has them a second time, with that velocity.
         """
 
     def unseen(self) -> numpy.typing.NDArray[numpy.float64]:

@@ -15,8 +15,18 @@ constexpr double border_period = 0.2;    // Time between two searches for the bo
 constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape explains, in standard deviations.
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double counts_beside = 0.35;   // Age up to which a motion counts for what another camera shows [s],
-constexpr double beside = 0.1;           // so near to the box of what moves [m]: cameras see neither sides of it nor its edges.
+constexpr double beside = 0.1;           // so near to the box of what moves [m]: no camera sees its edges.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
+
+/// Adds a point that moves to the box of what has its velocity.
+void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, double uncertainty) {
+  const auto known = std::find_if(movers.begin(), movers.end(), [&](const Mover& mover) { return mover.velocity == velocity; });
+  if (known == movers.end()) {
+    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty});
+  } else {
+    known->box.extend(point);
+  }
+}
 
 }  // namespace
 
@@ -121,6 +131,7 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
 
 void Perception::Impl::find_velocities(View& view, double time) {
   fresh.clear();
+  view.movers.clear();
   for (const int index : shown) {
     const auto n = static_cast<std::size_t>(index);
     velocities[n].setZero();
@@ -140,67 +151,60 @@ void Perception::Impl::find_velocities(View& view, double time) {
   const VelocityEstimate::Result found = view.motion.update(candidates, time);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     const int index = fresh[static_cast<std::size_t>(n)];
-    const bool moves = found.velocities.col(n).squaredNorm() > 0.0;
-    velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
+    const Eigen::Vector3d velocity = found.velocities.col(n);
+    const bool moves = velocity.squaredNorm() > 0.0;
+    velocities[static_cast<std::size_t>(index)] = velocity.cast<float>();
     uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(moves ? found.uncertainty[n] : 0.0);
     map.set_moves(index, moves);
+    if (moves) {
+      add_mover(view.movers, candidates.points().col(n), velocity, found.uncertainty[n]);
+    }
   }
 }
 
-void Perception::Impl::find_movers(std::size_t number, double time) {
-  movers.clear();
-  for (std::size_t n = 0; n < map.voxels().size(); ++n) {
-    const Voxel& voxel = map.voxels()[n];
-    const double age = time - voxel.last;
-    if (voxel.cell < 0 || !voxel.counts || !voxel.moves || voxel.camera == number || std::abs(age) > counts_beside ||
-        is_excluded[n] != 0) {
+const Mover* Perception::Impl::mover_beside(std::size_t number, const Eigen::Vector3d& point, double time) const {
+  const Mover* nearest = nullptr;
+  double distance = beside;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const double age = time - views[k].time;
+    if (k == number || !(std::abs(age) <= counts_beside)) {  // NaN: it has shown nothing yet
       continue;
     }
-    const Eigen::Vector3d now = voxel.frame_middle() + age * velocities[n].cast<double>();
-    const auto known = std::find_if(movers.begin(), movers.end(),
-                                    [&](const Mover& mover) { return velocities[mover.voxel] == velocities[n]; });
-    if (known == movers.end()) {
-      movers.push_back({n, Eigen::AlignedBox3d(now)});
-    } else {
-      known->box.extend(now);
+    for (const Mover& mover : views[k].movers) {
+      const double away = mover.box.exteriorDistance((point - age * mover.velocity).eval());
+      if (away <= distance) {
+        distance = away;
+        nearest = &mover;
+      }
     }
   }
-  for (Mover& mover : movers) {
-    mover.box.min().array() -= beside;
-    mover.box.max().array() += beside;
-  }
-  std::sort(movers.begin(), movers.end(), [&](const Mover& one, const Mover& other) {  // what was seen last has the last word
-    return map.voxels()[one.voxel].last > map.voxels()[other.voxel].last;
-  });
+  return nearest;
 }
 
 Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
   find_velocities(views[number], time);
-  find_movers(number, time);
   std::vector<int> handed = shown;
-  std::vector<std::size_t> moves_as(shown.begin(), shown.end());
+  std::vector<const Mover*> as(shown.size(), nullptr);  // nullptr: as the camera itself says
   for (const int index : fresh) {
-    const auto n = static_cast<std::size_t>(index);
-    const auto mover = std::find_if(movers.begin(), movers.end(), [&](const Mover& one) {
-      return !map.voxels()[n].moves && one.box.contains(map.voxels()[n].frame_middle());
-    });
-    if (mover != movers.end()) {
+    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
+    const Mover* const mover = voxel.moves ? nullptr : mover_beside(number, voxel.frame_middle(), time);
+    if (mover != nullptr) {
       handed.push_back(index);
-      moves_as.push_back(mover->voxel);
+      as.push_back(mover);
     }
   }
   const Obstacles all = balls(handed, true);
-  if (std::none_of(moves_as.begin(), moves_as.end(), [&](std::size_t n) { return map.voxels()[n].moves; })) {
-    return all;
-  }
-  Eigen::Matrix3Xd speeds(3, all.size());
+  Eigen::Matrix3Xd speeds = all.velocities();
   Eigen::VectorXd uncertainty(all.size());
   for (Eigen::Index n = 0; n < all.size(); ++n) {
-    const std::size_t as = moves_as[static_cast<std::size_t>(n)];
-    speeds.col(n) = velocities[as].cast<double>();
-    uncertainty[n] = static_cast<double>(uncertainties[as]);
+    const auto k = static_cast<std::size_t>(n);
+    uncertainty[n] =
+        as[k] != nullptr ? as[k]->uncertainty : static_cast<double>(uncertainties[static_cast<std::size_t>(handed[k])]);
+    if (as[k] != nullptr) {
+      speeds.col(n) = as[k]->velocity;
+    }
   }
-  return all.moving(std::move(speeds), std::move(uncertainty));
+  return all.size() > 0 && !speeds.isZero(0.0) ? all.moving(std::move(speeds), std::move(uncertainty)) : all;
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
@@ -215,6 +219,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
   for (const int index : map.touched()) {
     const auto n = static_cast<std::size_t>(index);
     if (!voxels[n].counts || map.is_background(voxels[n])) {
+      map.set_moves(index, false);
       continue;
     }
     is_excluded[n] = is_explained(n) || is_left_out(voxels[n]) ? 1 : 0;

@@ -18,6 +18,13 @@ namespace sidestep {
 
 inline constexpr std::size_t most_cameras = 16;
 
+/// What a camera sees moving in one piece.
+struct Mover {
+  Eigen::AlignedBox3d box;   // where it was at the camera's last image [m]
+  Eigen::Vector3d velocity;  // [m/s]
+  double uncertainty;        // [m/s]
+};
+
 struct Perception::Impl {
   /// A camera with its last image.
   struct View {
@@ -37,6 +44,7 @@ struct Perception::Impl {
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows
+    std::vector<Mover> movers;                                 // in its last image
   };
   struct Region {
     std::string name;
@@ -50,12 +58,6 @@ struct Perception::Impl {
     std::uint64_t version = 0;
     int cell = -1;
     bool is_explained = false;
-  };
-
-  /// What moves in one piece: one of its voxels, and where it is.
-  struct Mover {
-    std::size_t voxel;
-    Eigen::AlignedBox3d box;
   };
 
   Impl(Controller& controller, const std::vector<DepthCamera>& cameras, const PerceptionSettings& settings);
@@ -77,8 +79,8 @@ struct Perception::Impl {
   Obstacles balls(const std::vector<int>& chosen, bool moved) const;
   /// Finds the velocities of what a camera shows now and has not rested.
   void find_velocities(View& view, double time);
-  /// Finds what other cameras than one see moving, where it is at a time [s].
-  void find_movers(std::size_t number, double time);
+  /// What another camera than one sees moving near a point at a time [s]; null: nothing.
+  const Mover* mover_beside(std::size_t number, const Eigen::Vector3d& point, double time) const;
   /// What a camera shows, with velocities. What it cannot tell to move beside what another camera sees moving comes twice: at rest, and
   /// with that velocity.
   Obstacles moving_balls(std::size_t number, double time);
@@ -107,7 +109,6 @@ struct Perception::Impl {
   std::uint64_t told_version = 0;                      // Sum of their versions.
   std::vector<Tested> tested;                          // one per voxel
   std::vector<int> fresh;                              // Voxels that a camera shows and that may move, in work.
-  std::vector<Mover> movers;                           // What other cameras see moving, in work.
   std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
   std::vector<int> last_remembered;                    // The latter, as the controller has them.
   std::vector<Eigen::Vector3f> velocities;             // Per voxel, as the last image that showed it says [m/s].

@@ -89,9 +89,10 @@ float SteadyDepth::find_tiles(const DepthImage& image) noexcept {
     }
     for (auto sum = sums_.begin(), count = counts_.begin(); sum != sums_.end(); sum += tile, count += tile) {
       const float pixels = std::accumulate(count, count + tile, 0.0f);
-      const float mean = pixels < least_in_tile ? 0.0f : std::abs(std::accumulate(sum, sum + tile, 0.0f)) / pixels;
+      const bool shows = pixels >= least_in_tile;
+      const float mean = shows ? std::abs(std::accumulate(sum, sum + tile, 0.0f)) / pixels : 0.0f;
       tiles_[next++] = mean;
-      if (mean > 0.0f) {
+      if (shows) {
         sorted_tiles_[num++] = mean;
       }
     }
@@ -133,7 +134,7 @@ void SteadyDepth::follow(const DepthCamera& camera, const DepthImage& image, int
   way /= static_cast<float>(end - pixels.begin());
   std::for_each(pixels.begin(), end, [&](std::size_t i) {
     mean_[i] += way;
-    drift_[i] = 0.0f;
+    drift_[i] -= mean;  // the pixel's own remains: a surface of few pixels is left to the rule of each
     steady_[i] = images_[i] >= std::min(steady_after, most_) ? mean_[i] : image.depth()[i];
   });
 }

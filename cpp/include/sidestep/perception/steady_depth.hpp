@@ -18,7 +18,8 @@ namespace sidestep {
 ///
 /// Neighbours see a slow motion sooner than one pixel, and together they see its way. Where the mean difference of a tile of 8 x 8
 /// pixels is six times as large as that of most tiles and 0.25 sigma, or 0.8 sigma, the surface in it moves: its means are shifted by
-/// the mean of z - m. One as large as a tile is so shown less than 0.6 sigma behind.
+/// the mean of z - m. One that covers tiles, as does
+/// whatever is 15 pixels wide and high, is so shown less than 0.9 sigma behind.
 class SteadyDepth {
  public:
   SteadyDepth(const DepthCamera& camera, int most_images);
