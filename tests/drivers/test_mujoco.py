@@ -96,7 +96,9 @@ def test_a_simulator_that_is_killed_ends_the_run() -> None:
         os.kill(driver.pid, signal.SIGKILL)
         report = loop.finish()
     assert report.end == RunEnd.state_lost
-    assert report.why.startswith("the connection to the robot is gone: ")
+    # The system takes its time to close what a killed program held: until then nothing comes.
+    ways = ("the connection to the robot is gone: ", "no new state came from the robot: ")
+    assert report.why.startswith(ways), report.why
     assert driver.report == {}
 
 
