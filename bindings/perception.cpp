@@ -298,8 +298,8 @@ void bind_perception(nb::module_& m) {
            "What each pixel of the last image shows (height, width), a PixelLabel each.")
       .def("cells", &cells_of, nb::sig("def cells(self) -> dict[str, numpy.typing.NDArray[typing.Any]]"),
            "The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):\n"
-           "no camera shows it now, hidden (N,): something is in front of it. Beside what another camera sees moving\n"
-           "the controller has them a second time, with that velocity.")
+           "no camera shows it now, hidden (N,): something is in front of it. Copies that move as another camera\n"
+           "says are not listed.")
       .def("unseen", [](const Perception& self) { return to_numpy_points(self.unseen()); }, nb::sig("def unseen(self) -> numpy.typing.NDArray[numpy.float64]"),
            "Middles (N, 3) of cells where nobody has looked and that border on seen space [m].");
 }

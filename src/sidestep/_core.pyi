@@ -4451,8 +4451,8 @@ class Perception:
     def cells(self) -> dict[str, numpy.typing.NDArray[Any]]:
         """
         The obstacles that were handed to the controller: centres (N, 3) [m], velocities (N, 3) [m/s], radii (N,) [m], ages (N,) [s], cameras (N,), remembered (N,):
-        no camera shows it now, hidden (N,): something is in front of it. Beside what another camera sees moving
-        the controller has them a second time, with that velocity.
+        no camera shows it now, hidden (N,): something is in front of it. Copies that move as another camera
+        says are not listed.
         """
 
     def unseen(self) -> numpy.typing.NDArray[numpy.float64]:

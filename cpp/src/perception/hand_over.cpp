@@ -198,9 +198,10 @@ Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
   Eigen::VectorXd uncertainty(all.size());
   for (Eigen::Index n = 0; n < all.size(); ++n) {
     const auto k = static_cast<std::size_t>(n);
-    uncertainty[n] =
-        as[k] != nullptr ? as[k]->uncertainty : static_cast<double>(uncertainties[static_cast<std::size_t>(handed[k])]);
-    if (as[k] != nullptr) {
+    if (as[k] == nullptr) {
+      uncertainty[n] = static_cast<double>(uncertainties[static_cast<std::size_t>(handed[k])]);
+    } else {
+      uncertainty[n] = as[k]->uncertainty;
       speeds.col(n) = as[k]->velocity;
     }
   }

@@ -39,6 +39,7 @@ void add_row(const PixelLabel* __restrict__ labels, const float* __restrict__ im
 
 SteadyDepth::SteadyDepth(const DepthCamera& camera, int most_images)
     : most_(static_cast<float>(most_images)),
+      least_(std::min(steady_after, most_)),
       width_(camera.width),
       mean_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), 0.0f),
       images_(mean_),
@@ -57,7 +58,7 @@ void SteadyDepth::add(const DepthCamera& camera, const DepthImage& image) noexce
                                  jump,
                                  drift,
                                  most_,
-                                 std::min(steady_after, most_),
+                                 least_,
                                  static_cast<unsigned char>(PixelLabel::obstacle)};
   SIDESTEP_KERNEL_IN_USE(kernels::image_kernel)().steady(
       rule, image.depth(), reinterpret_cast<const unsigned char*>(image.labels()), static_cast<int>(image.size()), mean_.data(),
@@ -135,7 +136,7 @@ void SteadyDepth::follow(const DepthCamera& camera, const DepthImage& image, int
   std::for_each(pixels.begin(), end, [&](std::size_t i) {
     mean_[i] += way;
     drift_[i] -= mean;  // the pixel's own remains: a surface of few pixels is left to the rule of each
-    steady_[i] = images_[i] >= std::min(steady_after, most_) ? mean_[i] : image.depth()[i];
+    steady_[i] = images_[i] >= least_ ? mean_[i] : image.depth()[i];
   });
 }
 

@@ -142,6 +142,9 @@ BOOST_FIXTURE_TEST_CASE(what_moves_is_never_far_ahead_of_its_depth, Watching) {
   }
 }
 
+/// A disc of 25 pixels across.
+bool ball(std::size_t u, std::size_t v) { return (u - 67) * (u - 67) + (v - 53) * (v - 53) < 13 * 13; }
+
 /// How far something that comes nearer is behind its depth, at most [sigma]; it begins some sigma before a wall at 2 m.
 template <class Shows>
 double most_behind(Watching& camera, double before, double speed, const Shows& shows) {
@@ -159,7 +162,6 @@ double most_behind(Watching& camera, double before, double speed, const Shows& s
 }
 
 BOOST_FIXTURE_TEST_CASE(what_moves_in_a_part_of_the_image_is_hardly_ahead_of_its_depth, Watching) {
-  const auto ball = [](std::size_t u, std::size_t v) { return (u - 67) * (u - 67) + (v - 53) * (v - 53) < 13 * 13; };
   for (const double speed : {0.05, 0.1, 0.2, 0.38, 0.5, 0.7, 0.95}) {  // towards the camera, in sigma from image to image
     const double most = most_behind(*this, 100.0, speed, ball);
     BOOST_TEST(most < 0.9, "at " << speed << " sigma an image it is " << most << " sigma behind");
@@ -178,7 +180,6 @@ BOOST_FIXTURE_TEST_CASE(what_moves_in_a_part_of_each_tile_is_left_to_its_pixels,
 }
 
 BOOST_FIXTURE_TEST_CASE(a_slow_motion_is_followed_where_noise_is_told_too_large, Watching) {
-  const auto ball = [](std::size_t u, std::size_t v) { return (u - 67) * (u - 67) + (v - 53) * (v - 53) < 13 * 13; };
   camera.noise = {4.0 * noise, 0.0};
   const double most = most_behind(*this, 100.0, 0.4, ball);
   BOOST_TEST(most < 0.9 * 4.0);  // of the noise that was told

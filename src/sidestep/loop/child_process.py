@@ -11,7 +11,7 @@ _HEARS = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); 
 
 
 def hearing_ctrl_c(command: Sequence[str]) -> list[str]:
-    """The command as one of a program that hears Ctrl-C, also where this one is deaf to it, as in the background.
+    """The command of a program that hears Ctrl-C, even where this process ignores it, as in the background.
 
     A `preexec_fn` would run between fork and exec, where a process with threads may wait for ever.
     """

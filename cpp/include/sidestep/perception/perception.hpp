@@ -88,7 +88,7 @@ class Perception {
     int camera;                ///< that showed it last
     double age;                ///< since it was shown last, at the last image of any camera [s]
     bool is_remembered;        ///< no camera shows it now
-    Eigen::Vector3d velocity;  ///< as its own camera says [m/s]; beside what another one sees moving, it stands for two
+    Eigen::Vector3d velocity;  ///< as its own camera says [m/s]; copies with another's are not listed
     bool is_hidden;            ///< something is in front of it
   };
   std::vector<Cell> cells() const;

@@ -16,10 +16,9 @@ namespace sidestep {
 /// n = 5 the depth itself counts. So a surface that moves by 1 sigma or more from image to image is not averaged, and a slower one is shown
 /// less than 2 sigma behind where it is.
 ///
-/// Neighbours see a slow motion sooner than one pixel, and together they see its way. Where the mean difference of a tile of 8 x 8
-/// pixels is six times as large as that of most tiles and 0.25 sigma, or 0.8 sigma, the surface in it moves: its means are shifted by
-/// the mean of z - m. One that covers tiles, as does
-/// whatever is 15 pixels wide and high, is so shown less than 0.9 sigma behind.
+/// Neighbours see a slow motion sooner than one pixel does. The differences of a tile of 8 x 8 pixels have a mean d. The surface in the
+/// tile moves if |d| is beyond 0.25 sigma and beyond six times the median of all tiles, or beyond 0.8 sigma in any case. Its means are
+/// then shifted by the mean of z - m. A surface that covers whole tiles is so shown less than 0.9 sigma behind; one of 15 x 15 pixels does.
 class SteadyDepth {
  public:
   SteadyDepth(const DepthCamera& camera, int most_images);
@@ -40,7 +39,7 @@ class SteadyDepth {
   /// Shifts the means of the surface in one tile that moves.
   void follow(const DepthCamera& camera, const DepthImage& image, int left, int top) noexcept;
 
-  float most_;
+  float most_, least_;  // images of a mean, and from which on it counts
   int width_;
   std::vector<float> mean_, images_, drift_, steady_;
   std::vector<float> sums_, counts_;         // of the differences of a row of tiles, by columns of pixels: in work
