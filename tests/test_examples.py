@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from support.busy_machine import unless_held_up
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -158,7 +160,7 @@ def test_12_without_the_camera_the_arm_hits_the_box() -> None:
 
 
 def test_13_a_driver_of_ones_own_arrives() -> None:
-    assert run("13") == "arrived the arm is at its goal\n"
+    assert unless_held_up(lambda: run("13"), str) == "arrived the arm is at its goal\n"
     text = (EXAMPLES / "13_a_driver_of_your_own.py").read_text(encoding="utf-8")
     driver = text.split("class JsonRobot")[1].split("def stand_in")[0]
     assert len(driver.splitlines()) <= 60

@@ -23,6 +23,7 @@ from sidestep.controller import (
 )
 from sidestep.loop import Loop
 from sidestep.obstacles import Box, Cylinder
+from support.busy_machine import PATIENT
 from support.mcap_bytes import FRAME, MESSAGE, messages, sign
 
 Q = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785])
@@ -335,7 +336,7 @@ def test_requests_of_other_threads_are_replayed_at_the_steps_that_took_them(arm,
     with controller.record(tmp_path / "run.mcap"):
         thread = threading.Thread(target=ask)
         thread.start()
-        run = Loop(controller, ss.drivers.Ideal(controller.arm, Q), duration=1.5)
+        run = Loop(controller, ss.drivers.Ideal(controller.arm, Q), PATIENT, duration=1.5)
         run.start()
         time.sleep(0.5)
         controller.attach("rod", Cylinder(0.02, 0.2), link="fr3_hand", pose=at(0, 0, 0.2), may_touch=FINGERS)

@@ -15,8 +15,9 @@ import pytest
 import sidestep as ss
 from sidestep._core import RobotPort
 from sidestep.drivers import MuJoCo
-from sidestep.loop import Loop, LoopSettings, RunEnd
+from sidestep.loop import Loop, RunEnd
 from sidestep.simulation import Simulation
+from support.busy_machine import PATIENT
 from support.planar_scenario import planar_scenario
 
 SCENARIO = "planar-one-obstacle"
@@ -38,7 +39,7 @@ def test_two_programs_move_as_one_process_does(tmp_path: Path) -> None:
     with MuJoCo(scenario, speed=0.0, motion=tmp_path / "motion.npz") as driver:
         assert driver.description.joints == list(parts.robot.coordinate_names)
         assert not driver.description.real_time
-        report = ss.run(parts.mover, driver)
+        report = ss.run(parts.mover, driver, settings=PATIENT)
     assert report.end == RunEnd.arrived
     assert report.lost == 0
     assert driver.report["limits_exceeded"] == []
@@ -65,7 +66,7 @@ def test_a_late_and_lossy_connection_is_coped_with_and_repeats(tmp_path: Path) -
         with MuJoCo(
             scenario, delay=(0.001, 0.005), jitter=0.0005, loss=0.1, seed=3, speed=0.0, motion=motion
         ) as driver:
-            ends.append(ss.run(parts.mover, driver, duration=20.0).end)
+            ends.append(ss.run(parts.mover, driver, duration=20.0, settings=PATIENT).end)
         assert driver.report["limits_exceeded"] == []
         assert driver.report["messages"]["to_driver"]["lost"] > 50
         with np.load(motion) as rows:
@@ -81,7 +82,7 @@ def test_paced_it_runs_by_the_machines_clock() -> None:
     with MuJoCo(scenario, hold=500) as driver:
         assert driver.description.real_time
         begin = time.monotonic()
-        report = ss.run(parts.mover, driver, until=None, duration=0.3)
+        report = ss.run(parts.mover, driver, until=None, duration=0.3, settings=PATIENT)
         assert time.monotonic() - begin >= 0.3
     assert report.end == RunEnd.duration
     assert driver.report["simulated_s"] >= 0.3
@@ -91,7 +92,7 @@ def test_a_simulator_that_is_killed_ends_the_run() -> None:
     scenario, parts = planar_scenario()
     with MuJoCo(scenario, speed=0.0) as driver:
         # A busy system takes its time to close what a killed program held, and nothing comes until then.
-        loop = Loop(parts.mover, driver, LoopSettings(state_timeout=10.0))
+        loop = Loop(parts.mover, driver, PATIENT)
         loop.start()
         time.sleep(0.05)
         os.kill(driver.pid, signal.SIGKILL)

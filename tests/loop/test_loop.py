@@ -10,6 +10,7 @@ import pytest
 
 import sidestep as ss
 from sidestep.loop import Loop, LoopSettings, ModelLoop, RunEnd, clock_lateness
+from support.busy_machine import PATIENT
 
 START, GOAL = np.array([0.2, 0.3]), np.array([0.8, -0.4])
 PERIOD = 0.002
@@ -32,7 +33,7 @@ def controller_of(
 def test_it_keeps_the_machines_time(arm: ss.Arm) -> None:
     controller = controller_of(arm)
     begin = time.monotonic()
-    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD), duration=0.3)
+    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD), PATIENT, duration=0.3)
     loop.start()
     report = loop.finish()
     assert time.monotonic() - begin >= 0.3  # by the clock, never ahead of it
@@ -62,7 +63,7 @@ def test_only_the_times_of_the_last_cycles_are_kept(arm: ss.Arm) -> None:
 @pytest.mark.parametrize("synchronous", [True, False])
 def test_a_goal_may_be_replaced_meanwhile_and_a_run_be_left(arm: ss.Arm, synchronous: bool) -> None:
     controller = controller_of(arm, START, synchronous=synchronous)
-    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD))
+    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD), PATIENT)
     loop.start()
     controller.set_goal(GOAL)
     for _ in range(1000):
@@ -84,7 +85,7 @@ def test_a_goal_may_be_replaced_meanwhile_and_a_run_be_left(arm: ss.Arm, synchro
 def test_a_second_run_and_what_is_for_the_loop_are_refused_beside_one(arm: ss.Arm) -> None:
     controller, at_rest = controller_of(arm, START), np.zeros(2)
     controller.step(START, at_rest)
-    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD))
+    loop = Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD), PATIENT)
     loop.start()
     for refused in (
         lambda: Loop(controller, ss.drivers.Ideal(arm, START, period=PERIOD)),
@@ -105,7 +106,8 @@ def test_a_second_run_and_what_is_for_the_loop_are_refused_beside_one(arm: ss.Ar
 
 
 def test_stop_ends_a_run_between_steps_that_are_far_apart(arm: ss.Arm) -> None:
-    loop = Loop(controller_of(arm, START, period=0.1), ss.drivers.Ideal(arm, START, period=0.1), duration=1e4)
+    robot = ss.drivers.Ideal(arm, START, period=0.1)
+    loop = Loop(controller_of(arm, START, period=0.1), robot, PATIENT, duration=1e4)
     loop.start()
     loop.stop()
     begin = time.monotonic()

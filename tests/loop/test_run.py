@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import sys
@@ -17,7 +18,9 @@ import pytest
 import sidestep as ss
 from sidestep.drivers import Ideal, RobotDescription, RobotState, RobotStopped
 from sidestep.loop import Loop, LoopSettings, RunEnd
+from support.busy_machine import PATIENT
 
+run = functools.partial(ss.run, settings=PATIENT)
 REST = 0.01  # [rad/s] below a tenth of the arrival speed, at which the loop lets go
 
 
@@ -66,7 +69,7 @@ def controller_of(arm: ss.Arm, *, period: float = 0.002, output: str = "position
 
 def test_a_driver_in_python_is_led_to_the_goal_and_back(arm: ss.Arm) -> None:
     controller, robot = controller_of(arm), PythonRobot(arm)
-    report = ss.run(controller, robot)
+    report = run(controller, robot)
     assert report.end == RunEnd.arrived
     assert report.is_success
     assert report.at_rest
@@ -74,7 +77,7 @@ def test_a_driver_in_python_is_led_to_the_goal_and_back(arm: ss.Arm) -> None:
     assert np.abs(robot.q - arm.neutral - 0.3).max() < 0.01  # ArrivalSettings.joint
     assert len(report.late) == len(report.taken) == report.cycles > 100
     controller.set_goal(arm.neutral)
-    assert ss.run(controller, robot).end == RunEnd.arrived
+    assert run(controller, robot).end == RunEnd.arrived
     assert np.abs(robot.q - arm.neutral).max() < 0.01
 
 
@@ -84,7 +87,7 @@ def test_the_ideal_robot_runs_faster_than_real_time(arm: ss.Arm) -> None:
     controller.set_goal(arm.neutral + 0.3)
     driver = Ideal(arm, real_time=False)
     begin = time.monotonic()
-    report = ss.run(controller, driver, until=None, duration=20.0)
+    report = run(controller, driver, until=None, duration=20.0)
     assert report.end == RunEnd.duration
     assert report.cycles >= 20_000
     assert time.monotonic() - begin < 15.0  # [s] for 20 s of motion, on a busy machine
@@ -99,7 +102,7 @@ def test_a_function_says_when_a_run_is_done(arm: ss.Arm) -> None:
             done.append(state.q[0])
         return bool(done)
 
-    report = ss.run(controller, robot, until=until)
+    report = run(controller, robot, until=until)
     assert report.end == RunEnd.arrived
     assert report.why == "until says so"
     assert arm.neutral[0] + 0.1 < done[0] <= robot.q[0] < done[0] + 0.19
@@ -115,7 +118,7 @@ def test_an_exception_comes_out_once_the_arm_is_at_rest(arm: ss.Arm) -> None:
         return False
 
     with pytest.raises(ZeroDivisionError, match="of the program around it"):
-        ss.run(controller, robot, until=until)
+        run(controller, robot, until=until)
     assert robot.calls[-1] == "stop"
     assert np.abs(robot.v).max() < REST
     assert not controller.is_paused
@@ -147,11 +150,11 @@ def test_ctrl_c_brings_the_arm_to_rest(arm: ss.Arm) -> None:
     thread = threading.Thread(target=press)
     thread.start()
     with pytest.raises(KeyboardInterrupt):
-        ss.run(controller, robot)
+        run(controller, robot)
     thread.join()
     assert robot.calls == ["start position", "stop"]
     assert np.abs(robot.v).max() < REST
-    assert ss.run(controller, robot).end == RunEnd.arrived  # the goal was kept
+    assert run(controller, robot).end == RunEnd.arrived  # the goal was kept
 
 
 def test_an_interrupt_as_the_run_begins_brings_the_arm_to_rest(
@@ -173,7 +176,7 @@ def test_an_interrupt_as_the_run_begins_brings_the_arm_to_rest(
     monkeypatch.setattr(sys.modules["sidestep.loop.run"], "Loop", InterruptedAtStart)
     controller, robot = controller_of(arm), PythonRobot(arm)
     with pytest.raises(KeyboardInterrupt):
-        ss.run(controller, robot)
+        run(controller, robot)
     assert robot.calls == ["start position", "stop"]
     assert np.abs(robot.v).max() < REST
     assert np.abs(robot.q - arm.neutral).max() < 0.2  # [rad] the goal is 0.3 away
@@ -202,7 +205,7 @@ def test_what_a_driver_raises_ends_the_run(arm: ss.Arm, error: Exception, end: R
             raise error
 
     robot.fault = fault
-    report = ss.run(controller, robot)
+    report = run(controller, robot)
     assert report.end == end
     assert report.why == words
     assert not report.is_success
@@ -215,7 +218,7 @@ def test_a_start_that_fails_is_raised_as_it_is(arm: ss.Arm) -> None:
             raise PermissionError("the brakes are on")
 
     with pytest.raises(PermissionError, match="the brakes are on"):
-        ss.run(controller_of(arm), Locked(arm))
+        run(controller_of(arm), Locked(arm))
 
 
 @pytest.mark.parametrize(
@@ -232,7 +235,7 @@ def test_what_does_not_fit_is_refused(arm: ss.Arm, change: dict[str, Any], words
         "other", **({"period": 0.002, "outputs": ["position"], "joints": robot.description.joints} | change)
     )
     with pytest.raises(ValueError, match=words):
-        ss.run(controller_of(arm), robot)
+        run(controller_of(arm), robot)
     assert robot.calls == []
 
 
@@ -240,7 +243,7 @@ def test_nobody_moves_among_obstacles_that_nobody_told(arm: ss.Arm) -> None:
     controller = ss.Controller(arm, ss.ControllerSettings(output="position", period=0.002))
     robot = PythonRobot(arm)
     with pytest.raises(RuntimeError, match="no obstacles are known"):
-        ss.run(controller, robot, settings=LoopSettings(start_timeout=0.05))
+        run(controller, robot, settings=LoopSettings(start_timeout=0.05))
     assert robot.calls == []
 
 
@@ -248,29 +251,29 @@ def test_a_start_that_fails_leaves_the_controller_to_the_next_run(arm: ss.Arm, t
     controller = ss.Controller(arm, ss.ControllerSettings(output="position", period=0.002))
     impatient = LoopSettings(start_timeout=0.05)
     with pytest.raises(RuntimeError, match="no obstacles are known") as kept:  # its frames hold the loop
-        ss.run(controller, PythonRobot(arm), settings=impatient, record=tmp_path / "run.mcap")
+        run(controller, PythonRobot(arm), settings=impatient, record=tmp_path / "run.mcap")
     assert kept.value is not None
     controller.set_obstacles(ss.Obstacles.none())
     controller.set_goal(arm.neutral + 0.3)
-    assert ss.run(controller, PythonRobot(arm)).end == RunEnd.arrived
+    assert run(controller, PythonRobot(arm)).end == RunEnd.arrived
 
 
 def test_what_is_no_driver_and_no_condition_is_named(arm: ss.Arm) -> None:
     with pytest.raises(TypeError, match="lacks 'description'"):
-        ss.run(controller_of(arm), object())
+        run(controller_of(arm), object())
     with pytest.raises(TypeError, match="until is 'soon'"):
-        ss.run(controller_of(arm), PythonRobot(arm), until="soon")
+        run(controller_of(arm), PythonRobot(arm), until="soon")
     with pytest.raises(TypeError, match="supervisor is 'yes', must be a Supervisor, True or False"):
-        ss.run(controller_of(arm), PythonRobot(arm), supervisor="yes")
+        run(controller_of(arm), PythonRobot(arm), supervisor="yes")
     with pytest.raises(ValueError, match=r"longest_gap is 0"):
-        ss.run(controller_of(arm), PythonRobot(arm), settings=LoopSettings(longest_gap=0.0))
+        run(controller_of(arm), PythonRobot(arm), settings=LoopSettings(longest_gap=0.0))
     with pytest.raises(ValueError, match="outputs"):
         RobotDescription("robot", period=0.001, outputs=["force"])
 
 
 def test_a_run_is_recorded_and_replayed(arm: ss.Arm, tmp_path: Any) -> None:
     path = tmp_path / "run.mcap"
-    report = ss.run(controller_of(arm), PythonRobot(arm), record=path)
+    report = run(controller_of(arm), PythonRobot(arm), record=path)
     result = ss.replay(path)
     assert result.equal
     assert result.complete
@@ -281,21 +284,21 @@ def test_the_last_half_minute_of_a_run_is_kept(
     arm: ss.Arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path / "cache"))
-    report = ss.run(controller_of(arm), PythonRobot(arm))
+    report = run(controller_of(arm), PythonRobot(arm))
     kept = ss.load_recording(tmp_path / "cache" / "black-box" / "planar3")
     assert abs(len(kept.time) - report.cycles) <= 5  # and those before the first motion
     np.testing.assert_allclose(kept.q[-1], arm.neutral + 0.3, atol=0.01)
-    ss.run(controller_of(arm), PythonRobot(arm), black_box=tmp_path / "box")
+    run(controller_of(arm), PythonRobot(arm), black_box=tmp_path / "box")
     assert list((tmp_path / "box").iterdir())
-    ss.run(controller_of(arm), PythonRobot(arm), black_box=False)
+    run(controller_of(arm), PythonRobot(arm), black_box=False)
     with pytest.warns(RuntimeWarning, match="no black box of this run") as warned:
-        ss.run(controller_of(arm), PythonRobot(arm), black_box="/proc/nowhere")
+        run(controller_of(arm), PythonRobot(arm), black_box="/proc/nowhere")
     assert warned[0].filename == __file__
 
 
 def test_a_controller_runs_on_one_robot_at_a_time(arm: ss.Arm) -> None:
     controller, robot = controller_of(arm), PythonRobot(arm)
-    loop = Loop(controller, robot)
+    loop = Loop(controller, robot, PATIENT)
     with pytest.raises(RuntimeError, match="in use"):
         Loop(controller, PythonRobot(arm))
     loop.start()

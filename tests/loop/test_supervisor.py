@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import pytest
 
 import sidestep as ss
 from sidestep.loop import RunEnd, Supervisor, SupervisorSettings
+from support.busy_machine import PATIENT
 
 
 @pytest.fixture(scope="module")
@@ -27,15 +29,16 @@ def controller_of(arm: ss.Arm) -> ss.Controller:
     return controller
 
 
-PATIENT = SupervisorSettings(state_age=2.0, command_age=2.0, approval_age=0.5)  # of a busy machine
+SUPERVISED = SupervisorSettings(state_age=10.0, command_age=10.0, approval_age=2.0)  # on a busy machine
+run = functools.partial(ss.run, settings=PATIENT)
 
 
 def test_a_supervised_run_arrives_and_a_dead_supervisor_ends_the_next(arm: ss.Arm) -> None:
     controller, robot = controller_of(arm), ss.drivers.Ideal(arm)
-    with Supervisor(controller, PATIENT) as supervisor:
+    with Supervisor(controller, SUPERVISED) as supervisor:
         process = supervisor.process
         assert process not in (None, os.getpid())
-        report = ss.run(controller, robot, supervisor=supervisor)
+        report = run(controller, robot, supervisor=supervisor)
         assert report.end == RunEnd.arrived, report.why
         assert report.unwritten == 0
         assert supervisor.approves
@@ -50,34 +53,34 @@ def test_a_supervised_run_arrives_and_a_dead_supervisor_ends_the_next(arm: ss.Ar
                 os.kill(process, signal.SIGKILL)
             return False
 
-        report = ss.run(controller, robot, until=kill_on_the_way, supervisor=supervisor)
+        report = run(controller, robot, until=kill_on_the_way, supervisor=supervisor)
         assert killed
         assert report.end == RunEnd.denied
         assert "the supervisor has not answered" in report.why
         assert report.unwritten > 0
         supervisor.reset()
         assert supervisor.process not in (None, process)  # another one
-        assert ss.run(controller, robot, supervisor=supervisor).end == RunEnd.arrived
+        assert run(controller, robot, supervisor=supervisor).end == RunEnd.arrived
 
 
 def test_time_between_two_runs_is_no_silence(arm: ss.Arm) -> None:
     controller, robot = controller_of(arm), ss.drivers.Ideal(arm)
-    settings = SupervisorSettings(state_age=2.0, command_age=0.2, approval_age=0.5)
+    settings = SupervisorSettings(state_age=10.0, command_age=1.0, approval_age=2.0)
     with Supervisor(controller, settings) as supervisor:
-        assert ss.run(controller, robot, supervisor=supervisor).end == RunEnd.arrived
-        time.sleep(0.5)
+        assert run(controller, robot, supervisor=supervisor).end == RunEnd.arrived
+        time.sleep(1.5)
         controller.set_goal(arm.neutral)
-        report = ss.run(controller, robot, supervisor=supervisor)
+        report = run(controller, robot, supervisor=supervisor)
         assert report.end == RunEnd.arrived, report.why
 
 
 def test_what_exceeds_a_limit_is_denied(arm: ss.Arm) -> None:
     controller, robot = controller_of(arm), ss.drivers.Ideal(arm)
     strict = SupervisorSettings(
-        state_age=2.0, command_age=2.0, approval_age=0.5, tracking_tolerance=0.001
+        state_age=10.0, command_age=10.0, approval_age=2.0, tracking_tolerance=0.001
     )  # in a period the reference of an arm at speed goes on by more than 1 mm
     with Supervisor(controller, strict) as supervisor:
-        report = ss.run(controller, robot, supervisor=supervisor)
+        report = run(controller, robot, supervisor=supervisor)
     assert report.end == RunEnd.denied
     assert report.why.startswith("a command was not approved: joint '")
     assert "commanded position away from the arm" in report.why
@@ -109,7 +112,7 @@ def test_a_supervisor_of_another_controller_is_refused(arm: ss.Arm) -> None:
     controller = controller_of(arm)
     other = Supervisor(controller_of(arm))
     with pytest.raises(ValueError, match="supervisor is another controller's"):
-        ss.run(controller, ss.drivers.Ideal(arm), supervisor=other)
+        run(controller, ss.drivers.Ideal(arm), supervisor=other)
 
 
 def test_a_supervisor_whose_process_ends_at_once_says_so(

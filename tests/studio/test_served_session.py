@@ -25,6 +25,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.scene_obstacle import SceneObstacle
 from sidestep.studio.served_session import ServedSession
 from sidestep.studio.start import scenario_of
+from support.busy_machine import PATIENT
 
 pytest.importorskip("mujoco")
 PATIENCE = 20.0  # [s] on a busy machine
@@ -36,7 +37,7 @@ def served(tmp_path: Path) -> Iterator[tuple[ss.Controller, str]]:
     controller = ss.Controller(arm, ss.ControllerSettings(output="position"))
     controller.set_obstacles(ss.Obstacles.none())
     server = Server(controller, f"unix:{tmp_path / 'arm'}")
-    loop = Loop(controller, Ideal(arm), observers=[server])
+    loop = Loop(controller, Ideal(arm), PATIENT, observers=[server])
     loop.start()
     yield controller, server.address
     loop.stop()
