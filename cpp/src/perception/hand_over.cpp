@@ -16,16 +16,32 @@ constexpr double noise_explained = 3.0;  // Noise of a depth that a told shape e
 constexpr double pushed_back = 0.5;      // Distance by which balls stand behind what is seen, in edges of a cell.
 constexpr double counts_beside = 0.35;   // Age up to which a motion counts for what another camera shows [s],
 constexpr double beside = 0.1;           // so near to the box of what moves [m]: no camera sees its edges.
+constexpr int few_cells = 3;             // Number of cells that can be noise,
+constexpr int sure_images = 5;           // and of images from which on they are not, away from what rests.
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 /// Adds a point that moves to the box of what has its velocity.
-void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, double uncertainty) {
+void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, double uncertainty,
+               int images, bool apart) {
   const auto known = std::find_if(movers.begin(), movers.end(), [&](const Mover& mover) { return mover.velocity == velocity; });
   if (known == movers.end()) {
-    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty});
+    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty, 1, images, apart});
   } else {
     known->box.extend(point);
+    ++known->cells;
+    known->is_apart = known->is_apart || apart;
   }
+}
+
+/// Drops few cells that can be the noise of what rests, where nothing larger moves: they come and go beside it, and line up now and then.
+void drop_noise(std::vector<Mover>& movers) {
+  const auto few = std::partition(movers.begin(), movers.end(), [](const Mover& mover) { return mover.cells > few_cells; });
+  const auto is_noise = [&](const Mover& mover) {
+    return (!mover.is_apart || mover.images < sure_images) && std::none_of(movers.begin(), few, [&](const Mover& larger) {
+             return larger.box.exteriorDistance(mover.box) <= beside;
+           });
+  };
+  movers.erase(std::remove_if(few, movers.end(), is_noise), movers.end());
 }
 
 }  // namespace
@@ -150,14 +166,20 @@ void Perception::Impl::find_velocities(View& view, double time) {
   const Obstacles candidates = balls(fresh, true);
   const VelocityEstimate::Result found = view.motion.update(candidates, time);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
-    const int index = fresh[static_cast<std::size_t>(n)];
-    const Eigen::Vector3d velocity = found.velocities.col(n);
-    const bool moves = velocity.squaredNorm() > 0.0;
-    velocities[static_cast<std::size_t>(index)] = velocity.cast<float>();
-    uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(moves ? found.uncertainty[n] : 0.0);
-    map.set_moves(index, moves);
-    if (moves) {
-      add_mover(view.movers, candidates.points().col(n), velocity, found.uncertainty[n]);
+    if (!found.velocities.col(n).isZero(0.0)) {
+      const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];
+      add_mover(view.movers, candidates.points().col(n), found.velocities.col(n), found.uncertainty[n], found.sets[n],
+                !map.is_beside_rest(voxel));
+    }
+  }
+  drop_noise(view.movers);
+  for (Eigen::Index n = 0; n < candidates.size(); ++n) {
+    const auto is_of = [&](const Mover& mover) { return mover.velocity == found.velocities.col(n); };
+    if (std::any_of(view.movers.begin(), view.movers.end(), is_of)) {
+      const int index = fresh[static_cast<std::size_t>(n)];
+      velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
+      uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(found.uncertainty[n]);
+      map.set_moves(index, true);
     }
   }
 }

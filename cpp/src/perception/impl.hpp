@@ -23,6 +23,8 @@ struct Mover {
   Eigen::AlignedBox3d box;   // where it was at the camera's last image [m]
   Eigen::Vector3d velocity;  // [m/s]
   double uncertainty;        // [m/s]
+  int cells, images;         // that show it, and in which it was found
+  bool is_apart;             // Some of them are not beside what rests.
 };
 
 struct Perception::Impl {
@@ -38,7 +40,7 @@ struct Perception::Impl {
     int frame_of_arm;                                         // Frame on which the camera is; -1: the world.
     const float* depth;                                       // of the last image that was used, with less noise where it rests
     Eigen::Isometry3d X_WC;                                   // at the last image that was used
-    Eigen::Isometry3d shown_X_WC;                             // at the image that is held, used or not
+    Eigen::Isometry3d shown_X_WC, shown_X_WC_before;          // at the image that is held, used or not, and at the one before
     double time = std::numeric_limits<double>::quiet_NaN();   // of the last image that was used [s]
     double begin = std::numeric_limits<double>::quiet_NaN();  // of its first image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].

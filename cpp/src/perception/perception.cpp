@@ -103,6 +103,7 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   const auto placed = [&](const KinematicState& state) {
     return ArmInView{state, capture.pose.value_or(pose_of(view, state))};
   };
+  view.shown_X_WC_before = view.shown_X_WC;
   const Eigen::Isometry3d X_WC = view.shown_X_WC = placed(now).X_WC;
   view.mask.mark(view.camera, view.rays, placed(before), placed(now), placed(after), view.image);
   report.mask_time = since(mark);
@@ -119,8 +120,16 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   } else {
     view.depth = view.image.depth();
   }
-  const SeenImage seen{
-      view.camera, view.rays, X_WC, view.image, view.depth, view.mask.front(), static_cast<std::uint8_t>(number), time};
+  const SeenImage seen{view.camera,
+                       view.rays,
+                       X_WC,
+                       view.image,
+                       view.depth,
+                       view.mask.front(),
+                       static_cast<std::uint8_t>(number),
+                       time,
+                       view.mask.front_before(),
+                       view.shown_X_WC_before};
   map.add(seen);
   report.map_time = since(mark);
   if (unseen) {

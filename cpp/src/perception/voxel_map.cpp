@@ -26,6 +26,7 @@ constexpr double settled_noise = 2.0;     // Noise of depths that explains a cel
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
 constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it,
 constexpr double around = 0.35;           // so far from it, in sizes of the box.
+constexpr double silhouette = 3.0;        // Pixels beside the arm in which depths fly, or have none.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
 
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
@@ -151,6 +152,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
     voxel.shown_images = 0;
   }
   const bool shown_again = voxel.first < seen.time;
+  voxel.is_uncovered = shown_again ? voxel.is_uncovered : was_covered(voxel, seen);
   const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
@@ -173,6 +175,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.free_images = voxel.missed_images = voxel.gap = 0;
   voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
+  voxel.rests = voxel.rests || voxel.last - voxel.first > background_after || (voxel.is_uncovered && is_beside_rest(voxel));
 }
 
 VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {
@@ -216,6 +219,37 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
                                       : Sight::hidden;
 }
 
+bool VoxelMap::was_covered(const Voxel& voxel, const SeenImage& seen) const noexcept {
+  if (seen.arm_front_before == nullptr) {
+    return true;
+  }
+  const Eigen::Vector3d middle = seen.X_WC_before.inverse() * voxel.frame_middle();
+  const double half = half_diagonal * edge(voxel);
+  if (middle.z() <= seen.camera.near + half) {
+    return true;
+  }
+  const Eigen::Vector2d pixel = seen.camera.project(middle);
+  const double beside_u = half / middle.z() * seen.camera.fx + silhouette,
+               beside_v = half / middle.z() * seen.camera.fy + silhouette;
+  for (const double side_v : {0.0, -beside_v, beside_v}) {
+    for (const double side_u : {0.0, -beside_u, beside_u}) {
+      const double u = std::round(pixel.x() + side_u), v = std::round(pixel.y() + side_v);
+      if (!(u >= 0.0 && v >= 0.0 && u < seen.camera.width && v < seen.camera.height)) {
+        if (side_u == 0.0 && side_v == 0.0) {
+          return true;
+        }
+        continue;
+      }
+      const std::size_t i =
+          static_cast<std::size_t>(v) * static_cast<std::size_t>(seen.camera.width) + static_cast<std::size_t>(u);
+      if (static_cast<double>(seen.arm_front_before[i]) < middle.z()) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept {
   voxel.shown_by &= static_cast<std::uint16_t>(~bit(seen.number));
   voxel.gap = static_cast<std::uint8_t>(std::min(voxel.gap + (seen.number == voxel.camera ? 1 : 0), 255));
@@ -241,19 +275,36 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
 }
 
 bool VoxelMap::is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept {
-  if (voxel.last - voxel.first > background_after) {
+  if (voxel.rests) {
     return true;
   }
   const Eigen::Vector3d middle = voxel.middle();
   const double depth = (middle - eye).norm(), edge = this->edge(voxel), reach = edge + settled_noise * noise.sigma(depth);
   const Eigen::Vector3d along = (middle - eye) / std::max(depth, 1e-6);
   for (double step = edge; step <= reach; step += edge) {
-    for (const double side : {step, -step}) {
-      const Eigen::Vector3f p = (middle + side * along).cast<float>();
-      const int other = voxel_of(p.data());
-      if (other >= 0) {
-        const Voxel& neighbour = voxels_[static_cast<std::size_t>(other)];
-        if (neighbour.counts && neighbour.last - neighbour.first > background_after) {
+    if (rests_at(middle + step * along) || rests_at(middle - step * along)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool VoxelMap::rests_at(const Eigen::Vector3d& point) const noexcept {
+  const Eigen::Vector3f p = point.cast<float>();
+  const int index = voxel_of(p.data());
+  if (index < 0) {
+    return false;
+  }
+  const Voxel& voxel = voxels_[static_cast<std::size_t>(index)];
+  return voxel.counts && voxel.rests;
+}
+
+bool VoxelMap::is_beside_rest(const Voxel& voxel) const noexcept {
+  const double edge = this->edge(voxel);
+  for (const double x : {-edge, 0.0, edge}) {
+    for (const double y : {-edge, 0.0, edge}) {
+      for (const double z : {-edge, 0.0, edge}) {
+        if (rests_at(voxel.middle() + Eigen::Vector3d(x, y, z))) {
           return true;
         }
       }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <boost/test/unit_test.hpp>
 #include <memory>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -179,6 +180,69 @@ BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
   BOOST_TEST(num > 20);
   BOOST_TEST((sum / num - Eigen::Vector3d(0.0, -0.5, 0.0)).norm() <
              0.2);  // cells of 2 cm stand still, images 12 cm apart are compared
+}
+
+BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_does_not_move, Watched) {
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  int uncovered = 0, moving = 0;
+  for (int n = -40; n < 25; ++n) {  // before it turns, what it does not hide rests for more than 1 s
+    scene = {};
+    scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);  // a wall behind the arm
+    const Eigen::VectorXd turned = q + Eigen::Vector4d(0.04 * std::max(n, 0), 0.0, 0.0, 0.0);
+    scene.add_arm(arm.robot(), arm.body(), turned);
+    look(Capture{time, turned, std::nullopt});
+    time += 0.03;
+    for (const Perception::Cell& cell : perception->cells()) {
+      moving += cell.velocity.isZero(0.0) ? 0 : 1;
+    }
+  }
+  for (const Perception::Cell& cell : perception->cells()) {
+    uncovered += std::abs(cell.centre.x() + 0.4) < 0.04 ? 1 : 0;
+  }
+  BOOST_TEST(uncovered > 100);
+  BOOST_TEST(moving == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(single_cells_that_come_and_go_hardly_ever_move, Watched) {
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> beside(-0.4, 0.4), before(0.03, 0.09);
+  int moving = 0;
+  for (int n = 0; n < 60; ++n) {
+    scene = {};
+    scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);
+    for (int k = 0; n > 0 && k < 100; ++k) {
+      scene.add_sphere({-0.4 + before(random), beside(random), 0.6 + beside(random)}, 0.015);
+    }
+    look();
+    for (const Perception::Cell& cell : perception->cells()) {
+      moving += cell.velocity.isZero(0.0) || cell.age > 0.0 ? 0 : 1;
+    }
+  }
+  BOOST_TEST(moving < 5);  // of 6,000
+}
+
+BOOST_FIXTURE_TEST_CASE(a_single_cell_that_goes_on_moves, Watched) {
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  scene = {};
+  scene.add_sphere({0.2, 20.0, 0.5}, 0.02);
+  scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);
+  look();
+  Eigen::Vector3d& centre = scene.balls.front().centre;
+  for (int n = 0; n < 8; ++n) {
+    centre.y() = 0.4 - 0.5 * 0.03 * n;
+    look();
+  }
+  const std::vector<Perception::Cell> cells = perception->cells();
+  BOOST_TEST(std::any_of(cells.begin(), cells.end(), [&](const Perception::Cell& cell) {
+    return (cell.centre - centre).norm() < 0.04 && (cell.velocity - Eigen::Vector3d(0.0, -0.5, 0.0)).norm() < 0.25;
+  }));
 }
 
 BOOST_FIXTURE_TEST_CASE(what_one_camera_sees_moving_moves_for_the_other_that_shows_its_back, Watched) {

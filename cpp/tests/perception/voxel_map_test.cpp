@@ -26,7 +26,9 @@ struct Mapped {
   double time = 1.0;
   std::vector<float> pixels;
 
-  SeenImage seen() { return {camera, rays, camera.pose, image, image.depth(), no_arm.data(), 0, time}; }
+  SeenImage seen() {
+    return {camera, rays, camera.pose, image, image.depth(), no_arm.data(), 0, time, no_arm.data(), camera.pose};
+  }
   void take(const test::DepthScene& scene) {
     pixels = scene.image(camera);
     image.take(camera, {std::span<const float>(pixels), 1.0});
@@ -219,6 +221,47 @@ BOOST_FIXTURE_TEST_CASE(the_arm_in_front_hides_too, Mapped) {
   add();
   add();
   BOOST_TEST(near(ball_at, 0.12) == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_cell_beside_what_rests_is_told_from_one_that_is_apart, Mapped) {
+  for (int n = 0; n < 40; ++n) {
+    add(wall_and_ball());
+  }
+  test::DepthScene scene = wall_and_ball();
+  scene.add_sphere({0.0, 0.115, 0.5}, 0.015);
+  scene.add_sphere({0.0, 0.3, 0.5}, 0.015);
+  add(scene);
+  int beside = 0, apart = 0;
+  for (const int index : map.touched()) {
+    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
+    if (voxel.last > voxel.first) {
+      continue;
+    }
+    if (voxel.middle().y() < 0.12) {
+      beside += map.is_beside_rest(voxel) ? 1 : 0;
+    } else if (voxel.middle().y() > 0.2) {
+      BOOST_TEST(!map.is_beside_rest(voxel));
+      ++apart;
+    }
+  }
+  BOOST_TEST(beside > 0);
+  BOOST_TEST(apart > 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(the_arm_in_the_image_before_covered_what_it_hid, Mapped) {
+  std::fill(no_arm.begin(), no_arm.begin() + 80 * 160, 0.5f);  // the upper two thirds of the image before
+  add(wall_and_ball());
+  int covered = 0, open = 0;
+  for (const int index : map.touched()) {
+    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
+    const double v = camera.project(camera.pose.inverse() * voxel.frame_middle()).y();
+    if (std::abs(v - 80.0) > 6.0) {  // the silhouette is beside a cell
+      BOOST_TEST(voxel.is_uncovered == (v < 80.0));
+      ++(v < 80.0 ? covered : open);
+    }
+  }
+  BOOST_TEST(covered > 10);
+  BOOST_TEST(open > 10);
 }
 
 BOOST_FIXTURE_TEST_CASE(holes_hide_what_was_there, Mapped) {
