@@ -201,7 +201,7 @@ BOOST_AUTO_TEST_CASE(a_lost_state_is_braked_without_one_and_a_lost_robot_is_let_
     std::this_thread::sleep_for(std::chrono::microseconds(read >= 400 ? 500 : 0));
     return read >= 400 ? DriverResult::waiting : DriverResult::ok;
   };
-  Loop loop(blind.controller, blind.driver, {.state_timeout = 0.03});
+  Loop loop(blind.controller, blind.driver, {.state_timeout = 0.03, .longest_gap = 10.0});
   loop.start();
   const RunReport lost = loop.finish();
   BOOST_TEST(to_string(lost.end) == "state_lost");
@@ -272,8 +272,8 @@ BOOST_AUTO_TEST_CASE(a_clock_that_is_late_within_the_longest_gap_is_borne) {
 
 BOOST_AUTO_TEST_CASE(a_robot_that_takes_long_to_start_has_no_clock_that_jumps) {
   Setup s(Output::position, true);
-  s.driver.starts_within_ = std::chrono::milliseconds(300);
-  Loop loop(s.controller, s.driver, {.duration = 0.1});
+  s.driver.starts_within_ = std::chrono::milliseconds(800);
+  Loop loop(s.controller, s.driver, {.duration = 0.1, .longest_gap = 0.7});
   loop.start();
   BOOST_TEST(to_string(loop.finish().end) == "duration");
 }
