@@ -29,6 +29,17 @@ constexpr double around = 0.35;           // so far from it, in sizes of the box
 constexpr double silhouette = 3.0;        // Pixels beside the arm in which depths fly, or have none.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
 
+/// Whether the arm is next to a run of pixels in a row of an image, from `first` to `last`, or beyond the pixels that fly beside it.
+bool is_beside_arm(const DepthImage& image, int v, std::size_t first, std::size_t last) noexcept {
+  constexpr int near = static_cast<int>(silhouette);
+  const int u0 = static_cast<int>(first), u1 = static_cast<int>(last), middle = (u0 + u1) / 2;
+  const auto is_arm = [&](int u, int row) {
+    return u >= 0 && row >= 0 && u < image.width() && row < image.height() &&
+           image.labels()[static_cast<std::ptrdiff_t>(row) * image.width() + u] == PixelLabel::arm;
+  };
+  return is_arm(u0 - near, v) || is_arm(u1 + near, v) || is_arm(middle, v - near) || is_arm(middle, v + near);
+}
+
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
 
 }  // namespace
@@ -89,6 +100,7 @@ void VoxelMap::begin_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   constexpr float inf = std::numeric_limits<float>::infinity();
   voxel.frame = frame_;
   voxel.pixels = 0;
+  voxel.is_cut = false;
   voxel.camera = seen.number;
   std::fill(voxel.frame_low, voxel.frame_low + 3, inf);
   std::fill(voxel.frame_high, voxel.frame_high + 3, -inf);
@@ -106,11 +118,12 @@ void VoxelMap::add_points(const SeenImage& seen) {
     kernel.place(X_WC, seen.rays.x() + row, seen.rays.y() + row, seen.depth + row, width, row_x_.data(), row_y_.data(),
                  row_z_.data());
     grid_.cells(row_x_.data(), row_y_.data(), row_z_.data(), width, row_cells_.data());
-    add_row(seen, seen.image.labels() + row);
+    add_row(seen, v);
   }
 }
 
-void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
+void VoxelMap::add_row(const SeenImage& seen, int v) {
+  const PixelLabel* const labels = seen.image.labels() + static_cast<std::ptrdiff_t>(v) * seen.image.width();
   const float *const x = row_x_.data(), *const y = row_y_.data(), *const z = row_z_.data();
   const int* const cells = row_cells_.data();
   const std::size_t width = row_cells_.size();
@@ -136,6 +149,7 @@ void VoxelMap::add_row(const SeenImage& seen, const PixelLabel* labels) {
       begin_frame(voxel, seen);
     }
     voxel.pixels += static_cast<int>(u - first);
+    voxel.is_cut = voxel.is_cut || is_beside_arm(seen.image, v, first, u - 1);
     voxel.frame_low[0] = std::min(voxel.frame_low[0], low_x);
     voxel.frame_low[1] = std::min(voxel.frame_low[1], low_y);
     voxel.frame_low[2] = std::min(voxel.frame_low[2], low_z);
@@ -153,7 +167,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   }
   const bool shown_again = voxel.first < seen.time;
   voxel.is_uncovered = shown_again ? voxel.is_uncovered : was_covered(voxel, seen);
-  const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
+  const float shrinks = voxel.is_cut ? 0.0f : voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
       voxel.low[axis] = voxel.frame_low[axis];

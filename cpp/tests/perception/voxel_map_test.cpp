@@ -223,6 +223,33 @@ BOOST_FIXTURE_TEST_CASE(the_arm_in_front_hides_too, Mapped) {
   BOOST_TEST(near(ball_at, 0.12) == 0);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_the_arm_hides_of_a_cell_is_kept, Mapped) {
+  for (int n = 0; n < 3; ++n) {
+    add(wall_and_ball());
+  }
+  const std::vector<Voxel> before = map.voxels();
+  take(wall_and_ball());
+  for (int i = 0; i < 160 * 120; ++i) {
+    if (i % 160 < 80) {  // through the middle of the ball
+      image.labels()[i] = PixelLabel::arm;
+      no_arm[static_cast<std::size_t>(i)] = 0.5f;
+    }
+  }
+  for (int n = 0; n < 10; ++n) {
+    add();
+  }
+  int cut = 0;
+  for (std::size_t n = 0; n < before.size(); ++n) {
+    const Voxel& voxel = map.voxels()[n];
+    if (voxel.is_cut && (voxel.middle() - ball_at).norm() < 0.12) {
+      ++cut;
+      BOOST_TEST((voxel.low_corner() - before[n].low_corner()).maxCoeff() <= 0.0);
+      BOOST_TEST((voxel.high_corner() - before[n].high_corner()).minCoeff() >= 0.0);
+    }
+  }
+  BOOST_TEST(cut > 3);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_cell_beside_what_rests_is_told_from_one_that_is_apart, Mapped) {
   for (int n = 0; n < 40; ++n) {
     add(wall_and_ball());

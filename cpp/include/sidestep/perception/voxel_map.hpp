@@ -31,6 +31,7 @@ struct Voxel {
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool moves;                         ///< What was in it moved when it was seen last.
   bool is_uncovered;                  ///< The arm hid it in the image before the first one that showed it.
+  bool is_cut;                        ///< The arm is beside what that image shows of it: it may hide the rest.
   bool rests;                         ///< It has been seen for long, or was uncovered beside what rests.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 
@@ -104,7 +105,7 @@ class VoxelMap {
 
  private:
   void add_points(const SeenImage& seen);
-  void add_row(const SeenImage& seen, const PixelLabel* labels);
+  void add_row(const SeenImage& seen, int v);
   Voxel& voxel_at(int cell, double time);
   void begin_frame(Voxel& voxel, const SeenImage& seen) noexcept;
   void end_frame(Voxel& voxel, const SeenImage& seen) noexcept;
