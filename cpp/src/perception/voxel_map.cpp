@@ -167,17 +167,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   }
   const bool shown_again = voxel.first < seen.time;
   voxel.is_uncovered = shown_again ? voxel.is_uncovered : was_covered(voxel, seen);
-  const float shrinks = voxel.is_cut ? 0.0f : voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(seen.time > voxel.last)) {  // its first image, or another camera's of the same time
-      voxel.low[axis] = voxel.frame_low[axis];
-      voxel.high[axis] = voxel.frame_high[axis];
-    } else {
-      voxel.low[axis] = std::min(voxel.frame_low[axis], voxel.low[axis] + shrinks * (voxel.frame_low[axis] - voxel.low[axis]));
-      voxel.high[axis] =
-          std::max(voxel.frame_high[axis], voxel.high[axis] + shrinks * (voxel.frame_high[axis] - voxel.high[axis]));
-    }
-  }
+  take_box(voxel, seen.time);
   const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();
   const double pixel = distance / std::min(seen.camera.fx, seen.camera.fy);
   const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
@@ -190,6 +180,30 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
   voxel.rests = voxel.rests || voxel.last - voxel.first > background_after || (voxel.is_uncovered && is_beside_rest(voxel));
+}
+
+void VoxelMap::take_box(Voxel& voxel, double time) const noexcept {
+  if (!(time > voxel.last)) {  // its first image, or another camera's of the same time
+    std::copy(voxel.frame_low, voxel.frame_low + 3, voxel.low);
+    std::copy(voxel.frame_high, voxel.frame_high + 3, voxel.high);
+    voxel.is_kept = false;
+    return;
+  }
+  if (voxel.is_cut && !voxel.is_kept) {
+    std::copy(voxel.low, voxel.low + 3, voxel.kept_low);
+    std::copy(voxel.high, voxel.high + 3, voxel.kept_high);
+  }
+  voxel.is_kept = voxel.is_cut;
+  const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
+  for (int axis = 0; axis < 3; ++axis) {
+    float &low = voxel.low[axis], &high = voxel.high[axis];
+    low = std::min(voxel.frame_low[axis], low + shrinks * (voxel.frame_low[axis] - low));
+    high = std::max(voxel.frame_high[axis], high + shrinks * (voxel.frame_high[axis] - high));
+    if (voxel.is_kept) {
+      low = std::min(low, voxel.kept_low[axis]);
+      high = std::max(high, voxel.kept_high[axis]);
+    }
+  }
 }
 
 VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {

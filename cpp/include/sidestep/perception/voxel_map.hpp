@@ -17,6 +17,7 @@ namespace sidestep {
 struct Voxel {
   float low[3], high[3];              ///< Box of what is in it [m], in the world.
   float frame_low[3], frame_high[3];  ///< The same of the last image that showed it.
+  float kept_low[3], kept_high[3];    ///< The box before the arm began to hide a part of it.
   float error;                        ///< By how much what is in it may be elsewhere [m]: calibration of its camera, there.
   double first, last;                 ///< Times of the first and the last image that showed it [s].
   std::uint32_t frame;                ///< Number of that image.
@@ -32,6 +33,7 @@ struct Voxel {
   bool moves;                         ///< What was in it moved when it was seen last.
   bool is_uncovered;                  ///< The arm hid it in the image before the first one that showed it.
   bool is_cut;                        ///< The arm is beside what that image shows of it: it may hide the rest.
+  bool is_kept;                       ///< So it was in the image before; what was known then counts.
   bool rests;                         ///< It has been seen for long, or was uncovered beside what rests.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 
@@ -115,6 +117,8 @@ class VoxelMap {
   void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
   /// Whether something rests in the cell of a point.
   bool rests_at(const Eigen::Vector3d& point) const noexcept;
+  /// Lets its box shrink to what the image shows, and extends it.
+  void take_box(Voxel& voxel, double time) const noexcept;
   /// Whether the arm, or the border of the image, hid a cell in the camera's image before.
   bool was_covered(const Voxel& voxel, const SeenImage& seen) const noexcept;
   void remove(Voxel& voxel) noexcept;
