@@ -80,9 +80,6 @@ double ArmMask::growth_of(const BodyEllipsoid& ellipsoid, const DepthCamera& cam
 
 void ArmMask::mark(const DepthCamera& camera, const CameraRays& rays, const ArmInView& before, const ArmInView& now,
                    const ArmInView& after, DepthImage& image) noexcept {
-  front_before_.reserve(image.size());
-  front_.reserve(image.size());
-  front_before_.swap(front_);
   front_.assign(image.size(), no_front);
   arm_.assign(image.size(), 0.0f);
   cores_.clear();

@@ -17,18 +17,19 @@ constexpr double pushed_back = 0.5;      // Distance by which balls stand behind
 constexpr double counts_beside = 0.35;   // Age up to which a motion counts for what another camera shows [s],
 constexpr double beside = 0.1;           // so near to the box of what moves [m]: no camera sees its edges.
 constexpr int few_cells = 3;             // Number of cells that can be noise,
-constexpr int sure_images = 5;           // and of images from which on they are not, away from what rests.
+constexpr double small_cell = 0.05;      // of that edge at most [m],
+constexpr double sure_age = 0.13;        // and time for which they must move away from what rests to be none [s].
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 /// Adds a point that moves to the box of what has its velocity.
 void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, double uncertainty,
-               int images, bool apart) {
+               int cells, double age, bool apart) {
   const auto known = std::find_if(movers.begin(), movers.end(), [&](const Mover& mover) { return mover.velocity == velocity; });
   if (known == movers.end()) {
-    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty, 1, images, apart});
+    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty, cells, age, apart});
   } else {
     known->box.extend(point);
-    ++known->cells;
+    known->cells += cells;
     known->is_apart = known->is_apart || apart;
   }
 }
@@ -37,7 +38,7 @@ void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const E
 void drop_noise(std::vector<Mover>& movers) {
   const auto few = std::partition(movers.begin(), movers.end(), [](const Mover& mover) { return mover.cells > few_cells; });
   const auto is_noise = [&](const Mover& mover) {
-    return (!mover.is_apart || mover.images < sure_images) && std::none_of(movers.begin(), few, [&](const Mover& larger) {
+    return (!mover.is_apart || !(mover.age >= sure_age)) && std::none_of(movers.begin(), few, [&](const Mover& larger) {
              return larger.box.exteriorDistance(mover.box) <= beside;
            });
   };
@@ -168,7 +169,8 @@ void Perception::Impl::find_velocities(View& view, double time) {
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];
-      add_mover(view.movers, candidates.points().col(n), found.velocities.col(n), found.uncertainty[n], found.sets[n],
+      add_mover(view.movers, candidates.points().col(n), found.velocities.col(n), found.uncertainty[n],
+                map.edge(voxel) > small_cell ? few_cells + 1 : 1, (found.sets[n] - 1) * (time - view.before),
                 !map.is_beside_rest(voxel));
     }
   }

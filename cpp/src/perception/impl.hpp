@@ -23,7 +23,8 @@ struct Mover {
   Eigen::AlignedBox3d box;   // where it was at the camera's last image [m]
   Eigen::Vector3d velocity;  // [m/s]
   double uncertainty;        // [m/s]
-  int cells, images;         // that show it, and in which it was found
+  int cells;                 // that show it; many where they are large
+  double age;                // for which it was seen to move [s]
   bool is_apart;             // Some of them are not beside what rests.
 };
 
@@ -37,12 +38,13 @@ struct Perception::Impl {
     DepthImage image;
     SteadyDepth steady;
     ArmMask mask;
-    int frame_of_arm;                                         // Frame on which the camera is; -1: the world.
-    const float* depth;                                       // of the last image that was used, with less noise where it rests
-    Eigen::Isometry3d X_WC;                                   // at the last image that was used
-    Eigen::Isometry3d shown_X_WC, shown_X_WC_before;          // at the image that is held, used or not, and at the one before
-    double time = std::numeric_limits<double>::quiet_NaN();   // of the last image that was used [s]
-    double begin = std::numeric_limits<double>::quiet_NaN();  // of its first image [s]
+    int frame_of_arm;                                        // Frame on which the camera is; -1: the world.
+    const float* depth;                                      // of the last image that was used, with less noise where it rests
+    Eigen::Isometry3d X_WC;                                  // at the last image that was used
+    Eigen::Isometry3d shown_X_WC;                            // at the image that is held, used or not
+    double time = std::numeric_limits<double>::quiet_NaN();  // of the last image that was used [s]
+    double before = std::numeric_limits<double>::quiet_NaN();  // of the one before that [s]
+    double begin = std::numeric_limits<double>::quiet_NaN();   // of its first image [s]
     double judged = std::numeric_limits<double>::quiet_NaN();  // Time at which `through` was updated [s].
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows

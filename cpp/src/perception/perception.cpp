@@ -103,7 +103,6 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   const auto placed = [&](const KinematicState& state) {
     return ArmInView{state, capture.pose.value_or(pose_of(view, state))};
   };
-  view.shown_X_WC_before = view.shown_X_WC;
   const Eigen::Isometry3d X_WC = view.shown_X_WC = placed(now).X_WC;
   view.mask.mark(view.camera, view.rays, placed(before), placed(now), placed(after), view.image);
   report.mask_time = since(mark);
@@ -120,16 +119,8 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   } else {
     view.depth = view.image.depth();
   }
-  const SeenImage seen{view.camera,
-                       view.rays,
-                       X_WC,
-                       view.image,
-                       view.depth,
-                       view.mask.front(),
-                       static_cast<std::uint8_t>(number),
-                       time,
-                       view.mask.front_before(),
-                       view.shown_X_WC_before};
+  const SeenImage seen{
+      view.camera, view.rays, X_WC, view.image, view.depth, view.mask.front(), static_cast<std::uint8_t>(number), time};
   map.add(seen);
   report.map_time = since(mark);
   if (unseen) {
@@ -137,6 +128,7 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   }
   report.unseen_time = since(mark);
   view.X_WC = X_WC;
+  view.before = view.time;
   view.time = time;
   view.begin = std::isnan(view.begin) ? time : view.begin;
   judge(view, report);
@@ -235,6 +227,7 @@ void Perception::forget() {
   for (auto& view : impl_->views) {
     view.begin = std::numeric_limits<double>::quiet_NaN();
     view.motion.forget();
+    view.movers.clear();
     view.steady.forget();
   }
 }

@@ -26,18 +26,30 @@ constexpr double settled_noise = 2.0;     // Noise of depths that explains a cel
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
 constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it,
 constexpr double around = 0.35;           // so far from it, in sizes of the box.
-constexpr double silhouette = 3.0;        // Pixels beside the arm in which depths fly, or have none.
+constexpr int widest_shadow = 16;         // Pixels without depth beside the arm, at most: one of two eyes does not see there.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
 
-/// Whether the arm is next to a run of pixels in a row of an image, from `first` to `last`, or beyond the pixels that fly beside it.
+/// Whether the arm is next to a pixel in a direction, or beyond pixels that fly beside it or have no depth.
+bool meets_arm(const DepthImage& image, int u, int v, int step_u, int step_v) noexcept {
+  for (int n = 0; n <= widest_shadow; ++n) {
+    u += step_u;
+    v += step_v;
+    if (u < 0 || v < 0 || u >= image.width() || v >= image.height()) {
+      return false;
+    }
+    const PixelLabel label = image.labels()[static_cast<std::ptrdiff_t>(v) * image.width() + u];
+    if (label != PixelLabel::nothing && label != PixelLabel::edge) {
+      return label == PixelLabel::arm;
+    }
+  }
+  return false;
+}
+
+/// The same of a run of pixels in a row.
 bool is_beside_arm(const DepthImage& image, int v, std::size_t first, std::size_t last) noexcept {
-  constexpr int near = static_cast<int>(silhouette);
   const int u0 = static_cast<int>(first), u1 = static_cast<int>(last), middle = (u0 + u1) / 2;
-  const auto is_arm = [&](int u, int row) {
-    return u >= 0 && row >= 0 && u < image.width() && row < image.height() &&
-           image.labels()[static_cast<std::ptrdiff_t>(row) * image.width() + u] == PixelLabel::arm;
-  };
-  return is_arm(u0 - near, v) || is_arm(u1 + near, v) || is_arm(middle, v - near) || is_arm(middle, v + near);
+  return meets_arm(image, u0, v, -1, 0) || meets_arm(image, u1, v, 1, 0) || meets_arm(image, middle, v, 0, -1) ||
+         meets_arm(image, middle, v, 0, 1);
 }
 
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
@@ -166,8 +178,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
     voxel.shown_images = 0;
   }
   const bool shown_again = voxel.first < seen.time;
-  voxel.is_uncovered = shown_again ? voxel.is_uncovered : was_covered(voxel, seen);
-  take_box(voxel, seen.time);
+  take_box(voxel, seen);
   const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();
   const double pixel = distance / std::min(seen.camera.fx, seen.camera.fy);
   const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
@@ -179,27 +190,28 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.free_images = voxel.missed_images = voxel.gap = 0;
   voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
-  voxel.rests = voxel.rests || voxel.last - voxel.first > background_after || (voxel.is_uncovered && is_beside_rest(voxel));
 }
 
-void VoxelMap::take_box(Voxel& voxel, double time) const noexcept {
-  if (!(time > voxel.last)) {  // its first image, or another camera's of the same time
+void VoxelMap::take_box(Voxel& voxel, const SeenImage& seen) const noexcept {
+  const std::uint16_t before = voxel.cut_by, camera = bit(seen.number);
+  voxel.cut_by = static_cast<std::uint16_t>(voxel.is_cut ? before | camera : before & ~camera);
+  if (voxel.shown_images == 0) {  // it begins
     std::copy(voxel.frame_low, voxel.frame_low + 3, voxel.low);
     std::copy(voxel.frame_high, voxel.frame_high + 3, voxel.high);
-    voxel.is_kept = false;
+    voxel.cut_by = 0;
     return;
   }
-  if (voxel.is_cut && !voxel.is_kept) {
+  if (before == 0 && voxel.cut_by != 0) {
     std::copy(voxel.low, voxel.low + 3, voxel.kept_low);
     std::copy(voxel.high, voxel.high + 3, voxel.kept_high);
   }
-  voxel.is_kept = voxel.is_cut;
-  const float shrinks = voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
+  const bool is_later = seen.time > voxel.last;  // else another camera's of the same time
+  const float shrinks = !is_later ? 0.0f : voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     float &low = voxel.low[axis], &high = voxel.high[axis];
     low = std::min(voxel.frame_low[axis], low + shrinks * (voxel.frame_low[axis] - low));
     high = std::max(voxel.frame_high[axis], high + shrinks * (voxel.frame_high[axis] - high));
-    if (voxel.is_kept) {
+    if (voxel.cut_by != 0) {
       low = std::min(low, voxel.kept_low[axis]);
       high = std::max(high, voxel.kept_high[axis]);
     }
@@ -247,37 +259,6 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
                                       : Sight::hidden;
 }
 
-bool VoxelMap::was_covered(const Voxel& voxel, const SeenImage& seen) const noexcept {
-  if (seen.arm_front_before == nullptr) {
-    return true;
-  }
-  const Eigen::Vector3d middle = seen.X_WC_before.inverse() * voxel.frame_middle();
-  const double half = half_diagonal * edge(voxel);
-  if (middle.z() <= seen.camera.near + half) {
-    return true;
-  }
-  const Eigen::Vector2d pixel = seen.camera.project(middle);
-  const double beside_u = half / middle.z() * seen.camera.fx + silhouette,
-               beside_v = half / middle.z() * seen.camera.fy + silhouette;
-  for (const double side_v : {0.0, -beside_v, beside_v}) {
-    for (const double side_u : {0.0, -beside_u, beside_u}) {
-      const double u = std::round(pixel.x() + side_u), v = std::round(pixel.y() + side_v);
-      if (!(u >= 0.0 && v >= 0.0 && u < seen.camera.width && v < seen.camera.height)) {
-        if (side_u == 0.0 && side_v == 0.0) {
-          return true;
-        }
-        continue;
-      }
-      const std::size_t i =
-          static_cast<std::size_t>(v) * static_cast<std::size_t>(seen.camera.width) + static_cast<std::size_t>(u);
-      if (static_cast<double>(seen.arm_front_before[i]) < middle.z()) {
-        return true;
-      }
-    }
-  }
-  return false;
-}
-
 void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept {
   voxel.shown_by &= static_cast<std::uint16_t>(~bit(seen.number));
   voxel.gap = static_cast<std::uint8_t>(std::min(voxel.gap + (seen.number == voxel.camera ? 1 : 0), 255));
@@ -303,7 +284,7 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
 }
 
 bool VoxelMap::is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept {
-  if (voxel.rests) {
+  if (voxel.last - voxel.first > background_after) {
     return true;
   }
   const Eigen::Vector3d middle = voxel.middle();
@@ -324,7 +305,7 @@ bool VoxelMap::rests_at(const Eigen::Vector3d& point) const noexcept {
     return false;
   }
   const Voxel& voxel = voxels_[static_cast<std::size_t>(index)];
-  return voxel.counts && voxel.rests;
+  return voxel.counts && voxel.last - voxel.first > background_after;
 }
 
 bool VoxelMap::is_beside_rest(const Voxel& voxel) const noexcept {

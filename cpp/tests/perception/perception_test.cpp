@@ -182,29 +182,6 @@ BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
              0.2);  // cells of 2 cm stand still, images 12 cm apart are compared
 }
 
-BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_does_not_move, Watched) {
-  camera.fx = camera.fy = 200.0;
-  start();
-  step();
-  int uncovered = 0, moving = 0;
-  for (int n = -40; n < 25; ++n) {  // before it turns, what it does not hide rests for more than 1 s
-    scene = {};
-    scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);  // a wall behind the arm
-    const Eigen::VectorXd turned = q + Eigen::Vector4d(0.04 * std::max(n, 0), 0.0, 0.0, 0.0);
-    scene.add_arm(arm.robot(), arm.body(), turned);
-    look(Capture{time, turned, std::nullopt});
-    time += 0.03;
-    for (const Perception::Cell& cell : perception->cells()) {
-      moving += cell.velocity.isZero(0.0) ? 0 : 1;
-    }
-  }
-  for (const Perception::Cell& cell : perception->cells()) {
-    uncovered += std::abs(cell.centre.x() + 0.4) < 0.04 ? 1 : 0;
-  }
-  BOOST_TEST(uncovered > 100);
-  BOOST_TEST(moving == 0);
-}
-
 BOOST_FIXTURE_TEST_CASE(single_cells_that_come_and_go_hardly_ever_move, Watched) {
   camera.fx = camera.fy = 200.0;
   start();

@@ -51,8 +51,6 @@ class ArmMask {
 
   /// Depth of the nearest surface of the grown arm [m], per pixel of the last image; infinite where it is not.
   const float* front() const noexcept { return front_.data(); }
-  /// The same of the image before; null: there was none.
-  const float* front_before() const noexcept { return front_before_.empty() ? nullptr : front_before_.data(); }
   const ArmResidual& residual() const noexcept { return residual_; }
   const std::vector<BodyEllipsoid>& ellipsoids() const noexcept { return ellipsoids_; }
   /// Growth δ of each ellipsoid of the last image [m], as in `body_ellipsoids`.
@@ -74,7 +72,7 @@ class ArmMask {
   std::vector<BodyEllipsoid> ellipsoids_;
   std::vector<double> growth_;
   std::vector<Seen> cores_;
-  std::vector<float> front_, front_before_, arm_;  // arm_: 1 where a pixel shows the arm
+  std::vector<float> front_, arm_;  // arm_: 1 where a pixel shows the arm
   ArmResidual residual_;
   double depth_errors_ = 0.0;
 };

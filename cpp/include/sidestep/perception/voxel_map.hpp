@@ -31,10 +31,8 @@ struct Voxel {
   std::uint8_t shown_images;          ///< Images that showed it, at most 255.
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool moves;                         ///< What was in it moved when it was seen last.
-  bool is_uncovered;                  ///< The arm hid it in the image before the first one that showed it.
-  bool is_cut;                        ///< The arm is beside what that image shows of it: it may hide the rest.
-  bool is_kept;                       ///< So it was in the image before; what was known then counts.
-  bool rests;                         ///< It has been seen for long, or was uncovered beside what rests.
+  bool is_cut;                        ///< That image has the arm beside it, which may hide a part of it.
+  std::uint16_t cut_by;               ///< Cameras of whose last image of it that is so, as bits.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 
   Eigen::Vector3d low_corner() const { return Eigen::Map<const Eigen::Vector3f>(low).cast<double>(); }
@@ -53,12 +51,10 @@ struct SeenImage {
   const CameraRays& rays;
   const Eigen::Isometry3d& X_WC;
   const DepthImage& image;
-  const float* depth;                    ///< per pixel [m]: of the image, or with less noise
-  const float* arm_front;                ///< Depth from which on the arm hides what is behind, per pixel [m].
-  std::uint8_t number;                   ///< of the camera
-  double time;                           ///< of capture [s]
-  const float* arm_front_before;         ///< The same of the camera's image before, null: there was none,
-  const Eigen::Isometry3d& X_WC_before;  ///< and its pose then.
+  const float* depth;      ///< per pixel [m]: of the image, or with less noise
+  const float* arm_front;  ///< Depth from which on the arm hides what is behind, per pixel [m].
+  std::uint8_t number;     ///< of the camera
+  double time;             ///< of capture [s]
 
   /// Depth up to which a pixel sees [m], of one that shows something: the arm is hidden where it begins.
   double sees_to(std::size_t pixel) const noexcept {
@@ -94,9 +90,9 @@ class VoxelMap {
   bool is_background(const Voxel& voxel) const noexcept {
     return grid_.level(voxel.cell) > 0 && voxel.last - voxel.first > background_after;
   }
-  /// Whether a voxel rests, or is noise along the ray of one that does.
+  /// Whether a voxel has rested: it has been seen for long, or noise along the ray explains it by one that has.
   bool is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept;
-  /// Whether what is in a cell next to it rests.
+  /// Whether a cell next to it has been seen for long.
   bool is_beside_rest(const Voxel& voxel) const noexcept;
   double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
   /// Indices of the voxels that the last image showed.
@@ -115,12 +111,10 @@ class VoxelMap {
   enum class Sight { elsewhere, hidden, surface, free };
   Sight sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
   void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
-  /// Whether something rests in the cell of a point.
+  /// Whether something has been seen for long in the cell of a point.
   bool rests_at(const Eigen::Vector3d& point) const noexcept;
   /// Lets its box shrink to what the image shows, and extends it.
-  void take_box(Voxel& voxel, double time) const noexcept;
-  /// Whether the arm, or the border of the image, hid a cell in the camera's image before.
-  bool was_covered(const Voxel& voxel, const SeenImage& seen) const noexcept;
+  void take_box(Voxel& voxel, const SeenImage& seen) const noexcept;
   void remove(Voxel& voxel) noexcept;
 
   PerceptionSettings settings_;
