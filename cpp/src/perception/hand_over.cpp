@@ -21,16 +21,16 @@ constexpr double small_cell = 0.05;      // of that edge at most [m],
 constexpr double sure_age = 0.13;        // and time for which they must move away from what rests to be none [s].
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
-/// Adds a point that moves to the box of what has its velocity.
-void add_mover(std::vector<Mover>& movers, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, double uncertainty,
-               int cells, double age, bool apart) {
-  const auto known = std::find_if(movers.begin(), movers.end(), [&](const Mover& mover) { return mover.velocity == velocity; });
+/// Adds a cell that moves to what has its velocity.
+void add_mover(std::vector<Mover>& movers, const Mover& cell) {
+  const auto known =
+      std::find_if(movers.begin(), movers.end(), [&](const Mover& mover) { return mover.velocity == cell.velocity; });
   if (known == movers.end()) {
-    movers.push_back({Eigen::AlignedBox3d(point), velocity, uncertainty, cells, age, apart});
+    movers.push_back(cell);
   } else {
-    known->box.extend(point);
-    known->cells += cells;
-    known->is_apart = known->is_apart || apart;
+    known->box.extend(cell.box);
+    known->cells += cell.cells;
+    known->is_apart = known->is_apart || cell.is_apart;
   }
 }
 
@@ -169,9 +169,12 @@ void Perception::Impl::find_velocities(View& view, double time) {
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];
-      add_mover(view.movers, candidates.points().col(n), found.velocities.col(n), found.uncertainty[n],
-                map.edge(voxel) > small_cell ? few_cells + 1 : 1, (found.sets[n] - 1) * (time - view.before),
-                !map.is_beside_rest(voxel));
+      add_mover(view.movers, {.box = Eigen::AlignedBox3d(candidates.points().col(n).eval()),
+                              .velocity = found.velocities.col(n),
+                              .uncertainty = found.uncertainty[n],
+                              .cells = map.edge(voxel) > small_cell ? few_cells + 1 : 1,
+                              .age = (found.sets[n] - 1) * (time - view.before),
+                              .is_apart = !map.is_beside_rest(voxel)});
     }
   }
   drop_noise(view.movers);

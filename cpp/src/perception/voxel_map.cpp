@@ -112,7 +112,11 @@ void VoxelMap::begin_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   constexpr float inf = std::numeric_limits<float>::infinity();
   voxel.frame = frame_;
   voxel.pixels = 0;
-  voxel.is_cut = false;
+  if (voxel.cut_by == 0) {
+    std::copy(voxel.low, voxel.low + 3, voxel.kept_low);
+    std::copy(voxel.high, voxel.high + 3, voxel.kept_high);
+  }
+  voxel.cut_by &= static_cast<std::uint16_t>(~bit(seen.number));
   voxel.camera = seen.number;
   std::fill(voxel.frame_low, voxel.frame_low + 3, inf);
   std::fill(voxel.frame_high, voxel.frame_high + 3, -inf);
@@ -161,7 +165,9 @@ void VoxelMap::add_row(const SeenImage& seen, int v) {
       begin_frame(voxel, seen);
     }
     voxel.pixels += static_cast<int>(u - first);
-    voxel.is_cut = voxel.is_cut || is_beside_arm(seen.image, v, first, u - 1);
+    if ((voxel.cut_by & bit(seen.number)) == 0 && is_beside_arm(seen.image, v, first, u - 1)) {
+      voxel.cut_by |= bit(seen.number);
+    }
     voxel.frame_low[0] = std::min(voxel.frame_low[0], low_x);
     voxel.frame_low[1] = std::min(voxel.frame_low[1], low_y);
     voxel.frame_low[2] = std::min(voxel.frame_low[2], low_z);
@@ -178,7 +184,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
     voxel.shown_images = 0;
   }
   const bool shown_again = voxel.first < seen.time;
-  take_box(voxel, seen);
+  take_box(voxel, seen.time);
   const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();
   const double pixel = distance / std::min(seen.camera.fx, seen.camera.fy);
   const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
@@ -192,20 +198,14 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.is_hidden = false;
 }
 
-void VoxelMap::take_box(Voxel& voxel, const SeenImage& seen) const noexcept {
-  const std::uint16_t before = voxel.cut_by, camera = bit(seen.number);
-  voxel.cut_by = static_cast<std::uint16_t>(voxel.is_cut ? before | camera : before & ~camera);
+void VoxelMap::take_box(Voxel& voxel, double time) const noexcept {
   if (voxel.shown_images == 0) {  // it begins
     std::copy(voxel.frame_low, voxel.frame_low + 3, voxel.low);
     std::copy(voxel.frame_high, voxel.frame_high + 3, voxel.high);
     voxel.cut_by = 0;
     return;
   }
-  if (before == 0 && voxel.cut_by != 0) {
-    std::copy(voxel.low, voxel.low + 3, voxel.kept_low);
-    std::copy(voxel.high, voxel.high + 3, voxel.kept_high);
-  }
-  const bool is_later = seen.time > voxel.last;  // else another camera's of the same time
+  const bool is_later = time > voxel.last;  // else another camera's of the same time
   const float shrinks = !is_later ? 0.0f : voxel.last - voxel.first > background_after ? settled_shrinks_by : shrinks_by;
   for (int axis = 0; axis < 3; ++axis) {
     float &low = voxel.low[axis], &high = voxel.high[axis];

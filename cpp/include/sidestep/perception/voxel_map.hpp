@@ -17,7 +17,7 @@ namespace sidestep {
 struct Voxel {
   float low[3], high[3];              ///< Box of what is in it [m], in the world.
   float frame_low[3], frame_high[3];  ///< The same of the last image that showed it.
-  float kept_low[3], kept_high[3];    ///< The box before the arm began to hide a part of it.
+  float kept_low[3], kept_high[3];    ///< The box before the arm began to hide a part of it, where `cut_by` any.
   float error;                        ///< By how much what is in it may be elsewhere [m]: calibration of its camera, there.
   double first, last;                 ///< Times of the first and the last image that showed it [s].
   std::uint32_t frame;                ///< Number of that image.
@@ -31,8 +31,7 @@ struct Voxel {
   std::uint8_t shown_images;          ///< Images that showed it, at most 255.
   bool counts;                        ///< It is an obstacle; else a second image must show it.
   bool moves;                         ///< What was in it moved when it was seen last.
-  bool is_cut;                        ///< That image has the arm beside it, which may hide a part of it.
-  std::uint16_t cut_by;               ///< Cameras of whose last image of it that is so, as bits.
+  std::uint16_t cut_by;               ///< Cameras whose last image of it has the arm beside it, which may hide a part; as bits.
   bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 
   Eigen::Vector3d low_corner() const { return Eigen::Map<const Eigen::Vector3f>(low).cast<double>(); }
@@ -113,8 +112,8 @@ class VoxelMap {
   void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
   /// Whether something has been seen for long in the cell of a point.
   bool rests_at(const Eigen::Vector3d& point) const noexcept;
-  /// Lets its box shrink to what the image shows, and extends it.
-  void take_box(Voxel& voxel, const SeenImage& seen) const noexcept;
+  /// Lets its box shrink to what an image at a time shows, and extends it.
+  void take_box(Voxel& voxel, double time) const noexcept;
   void remove(Voxel& voxel) noexcept;
 
   PerceptionSettings settings_;
