@@ -1,7 +1,6 @@
 """`sidestep bench realtime`."""
 
 import json
-import time
 
 import pytest
 
@@ -11,14 +10,9 @@ from sidestep.cli import main
 
 
 def test_every_row_is_of_what_was_asked_for():
-    told, begun = [], []
-
-    def progress(*news):
-        told.append(news)
-        begun.append(time.monotonic())
-
+    told = []
     settings = RealTimeBenchSettings(robot="planar2", points=50, seconds=0.4, refresh=50.0, camera=False)
-    document = run_real_time_bench(settings, progress=progress)
+    document = run_real_time_bench(settings, progress=lambda *news: told.append(news))
     assert [row["beside"] for row in document["results"]] == [*BESIDE, RECORDER]
     assert [news[:2] for news in told] == [(0, 4), (1, 4), (2, 4), (3, 4)]
     for row in document["results"]:
@@ -31,8 +25,8 @@ def test_every_row_is_of_what_was_asked_for():
         assert 0.0 < row["late_us"]["median"] <= row["late_us"]["max"]
     _, goals, clouds, recorded = document["results"]
     assert goals["clouds"] == 0
-    most = settings.refresh * (begun[3] - begun[2]) + 1  # a busy machine takes longer
-    assert 2 <= clouds["clouds"] <= most  # 20, fewer on a busy machine
+    stood_still = 1e-6 * clouds["late_us"]["max"]  # [s] of a busy machine, while clouds go on
+    assert 2 <= clouds["clouds"] <= 25 + settings.refresh * stood_still  # 20, fewer on a busy machine
     record = recorded["record"]
     assert record["replay_equal"]
     assert record["steps"] >= 400

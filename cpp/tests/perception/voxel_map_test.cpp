@@ -248,8 +248,8 @@ struct Cut : Mapped {
       const Voxel& voxel = map.voxels()[n];
       if (voxel.cut_by != 0 && (voxel.middle() - ball_at).norm() < 0.12) {
         ++num;
-        BOOST_TEST((voxel.low_corner() - before[n].low_corner()).maxCoeff() <= 1e-6);
-        BOOST_TEST((voxel.high_corner() - before[n].high_corner()).minCoeff() >= -1e-6);
+        BOOST_TEST((voxel.low_corner() - before[n].low_corner()).maxCoeff() <= 0.0);
+        BOOST_TEST((voxel.high_corner() - before[n].high_corner()).minCoeff() >= 0.0);
       }
     }
     return num;
