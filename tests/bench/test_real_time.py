@@ -31,7 +31,8 @@ def test_every_row_is_of_what_was_asked_for():
         assert 0.0 < row["late_us"]["median"] <= row["late_us"]["max"]
     _, goals, clouds, recorded = document["results"]
     assert goals["clouds"] == 0
-    assert 2 <= clouds["clouds"] <= 1 + settings.refresh * (begun[3] - begun[2])  # 20; a busy machine takes its time
+    taken = begun[3] - begun[2]  # [s]: 0.4, longer on a busy machine
+    assert 2 <= clouds["clouds"] <= 1 + settings.refresh * taken
     record = recorded["record"]
     assert record["replay_equal"]
     assert record["steps"] >= 400

@@ -34,6 +34,18 @@ void add_mover(std::vector<Mover>& movers, const Mover& cell) {
   }
 }
 
+/// What a camera sees from a pose X_WC: up to the borders of its image, in its range. The camera must outlive it.
+Sight sight_of(const DepthCamera& camera, const Eigen::Isometry3d& X_WC) {
+  return [&camera, X_CW = Eigen::Isometry3d(X_WC.inverse())](const Eigen::Vector3d& place) {
+    const Eigen::Vector3d p = X_CW * place;
+    if (!(p.z() >= camera.near && p.z() <= camera.far)) {
+      return false;
+    }
+    const Eigen::Vector2d at = camera.project(p);
+    return at.x() >= 0.0 && at.y() >= 0.0 && at.x() <= camera.width - 1 && at.y() <= camera.height - 1;
+  };
+}
+
 /// Drops few cells that can be the noise of what rests, where nothing larger moves: they come and go beside it, and line up now and then.
 void drop_noise(std::vector<Mover>& movers) {
   const auto few = std::partition(movers.begin(), movers.end(), [](const Mover& mover) { return mover.cells > few_cells; });
@@ -165,7 +177,7 @@ void Perception::Impl::find_velocities(View& view, double time) {
     return;
   }
   const Obstacles candidates = balls(fresh, true);
-  const VelocityEstimate::Result found = view.motion.update(candidates, time);
+  const VelocityEstimate::Result found = view.motion.update(candidates, time, sight_of(view.camera, view.X_WC));
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];

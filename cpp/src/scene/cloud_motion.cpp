@@ -33,7 +33,10 @@ constexpr std::size_t least_split = 5;  // Number of connected points that are t
 constexpr double split_distance = 0.008;   // Distance from the oldest set that noise explains [m].
 constexpr double held = 1.5;               // Spacings of the sets for which the same points again say nothing new [-].
 constexpr std::size_t few_clusters = 300;  // Number of clusters up to which every pair is compared.
+constexpr int cut_iterations = 10;         // Steps to the way of what is cut.
 constexpr std::size_t stray_points = 3;    // Number of points of a cluster that can be noise of the background, at most.
+
+const Sight everywhere;
 
 /// How much wider an error is if its deviation was found from `num` positions [-].
 double few_positions(int num) { return num == 3 ? 2.5 : num == 4 ? 1.5 : 1.2; }
@@ -60,7 +63,7 @@ bool CloudMotion::is_repeated(const Eigen::Matrix3Xd& points, double time) const
   return time - sets_[0].time <= (any ? held * (sets_[0].time - sets_[1].time) : least_spacing);
 }
 
-std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, double time) {
+std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, double time, Sight sight) {
   if (!sets_.empty() && time - sets_[0].time > longest_pause) {
     sets_.clear();
   }
@@ -77,11 +80,11 @@ std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, dou
     is_new[n] = rests[n].age < rested_age || rests[n].sets < rested_sets;
     is_old[n] = is_background(rests[n]);
   }
-  Set set{time, points, PointGrid(points), {}, {}};
+  Set set{time, points, PointGrid(points), std::move(sight), {}, {}};
   add_clusters(set, is_old, is_new);
   const bool few = set.clusters.size() <= few_clusters && (sets_.empty() || sets_[0].clusters.size() <= few_clusters);
   for (Cluster& cluster : set.clusters) {
-    judge(cluster, time, few);
+    judge(cluster, set, few);
   }
   learn_noise(set);
   split(set);
@@ -142,21 +145,22 @@ void CloudMotion::split(Set& set) const {
   for (std::vector<int>& members : set.grid.clusters(is_explained)) {
     if (members.size() >= least_split) {
       add_cluster(set, std::move(members));  // later clusters have the last word on their points
-      judge(set.clusters.back(), set.time, true);
+      judge(set.clusters.back(), set, true);
     }
   }
 }
 
-void CloudMotion::judge(Cluster& cluster, double time, bool among_few) const {
+void CloudMotion::judge(Cluster& cluster, const Set& set, bool among_few) const {
+  const double time = set.time;
   cluster.motion = {.uncertainty = largest_speed_};
   if (sets_.empty() || is_stray(cluster) || rests(cluster, time)) {
     return;
   }
-  const Match found = match(cluster, time, among_few);
+  const Match found = match(cluster, set, among_few);
   const Registration& last = found.registration;
   const double most = largest_speed_ * (time - sets_[0].time) + sure * std::max(last.error, least_error);
   if (last.is_known() && last.shift.norm() <= most) {
-    follow_line(cluster, found, time);
+    follow_line(cluster, found, set);
   } else {
     flickers(cluster, time);
   }
@@ -211,11 +215,69 @@ bool CloudMotion::is_stray(Cluster& cluster) const {
   return true;
 }
 
-CloudMotion::Match CloudMotion::match(const Cluster& cluster, double time, bool among_few) const {
+CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const {
+  Way way{other.middle - cluster.middle};
+  if (!now.sight || !then.sight) {
+    return way;
+  }
+  const Eigen::Matrix3Xd &points = cluster.sample, &earlier = other.sample;
+  // From the sights' ends a shift that is wrong by e goes on with an error of e/2 or less.
+  Eigen::Vector3d shift = way.shift;
+  for (int k = 0; k < cut_iterations; ++k) {
+    Eigen::Vector3d here = Eigen::Vector3d::Zero(), there = here;
+    int num_here = 0, num_there = 0;
+    for (Eigen::Index n = 0; n < points.cols(); ++n) {
+      if (then.sight(points.col(n) + shift)) {
+        here += points.col(n);
+        ++num_here;
+      }
+    }
+    for (Eigen::Index n = 0; n < earlier.cols(); ++n) {
+      if (now.sight(earlier.col(n) - shift)) {
+        there += earlier.col(n);
+        ++num_there;
+      }
+    }
+    if (num_here == points.cols() && num_there == earlier.cols()) {
+      break;
+    }
+    if (num_here < few_in_sight || num_there < few_in_sight) {
+      return way;
+    }
+    way.is_cut = true;
+    shift = there / num_there - here / num_here;
+  }
+  if (way.is_cut && shift.norm() <= largest_speed_ * (now.time - then.time)) {
+    way.shift = shift;
+  }
+  return way;
+}
+
+CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& now, const Set& then,
+                                           const Eigen::Vector3d& ahead) const {
+  if (cluster.points.size() <= stray_points) {  // their middle is their noise
+    return {{ahead}};
+  }
+  const Eigen::Vector3d place = cluster.middle + ahead;
+  const Cluster* nearest = nullptr;
+  for (const Cluster& other : then.clusters) {
+    if (((other.middle - place).cwiseAbs() - 0.5 * other.size).maxCoeff() <= PointGrid::edge &&
+        (nearest == nullptr || (other.middle - place).squaredNorm() < (nearest->middle - place).squaredNorm())) {
+      nearest = &other;
+    }
+  }
+  if (nearest == nullptr) {
+    return {{ahead}};
+  }
+  const Way way = way_back(cluster, now, *nearest, then);
+  return way.is_cut ? Starts{{way.shift}, true} : Starts{{way.shift, ahead}};
+}
+
+CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bool among_few) const {
   const Set& last = sets_[0];
-  const double duration = time - last.time;
+  const double duration = now.time - last.time;
   Match best;
-  std::vector<Eigen::Vector3d> starts;
+  Starts starts;
   for (std::size_t k = 0; among_few && k < last.clusters.size(); ++k) {
     const Cluster& other = last.clusters[k];
     const Eigen::Vector3d way = other.middle - cluster.middle;
@@ -226,17 +288,21 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, double time, bool 
         differs > 0.5 * std::max(other.size.norm(), cluster.size.norm()) + PointGrid::edge) {
       continue;
     }
-    starts.push_back(way);
-    if (!other.motion.velocity.isZero(0.0)) {
-      starts.push_back(-duration * other.motion.velocity);
-      best.moved = true;
+    const Way common = way_back(cluster, now, other, last);
+    const bool moved = !other.motion.velocity.isZero(0.0);
+    starts.shifts.push_back(common.shift);
+    starts.is_cut = starts.is_cut || common.is_cut;
+    if (moved && !common.is_cut) {
+      starts.shifts.push_back(-duration * other.motion.velocity);
     }
+    best.moved = best.moved || moved;
   }
-  best.registration = register_points(cluster.sample, last.grid, starts, 5);
+  best.registration = register_points(cluster.sample, last.grid, starts.shifts, 5, starts.is_cut ? last.sight : everywhere);
   return best;
 }
 
-void CloudMotion::follow_line(Cluster& cluster, const Match& match, double time) const {
+void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& now) const {
+  const double time = now.time;
   LineFit<3>::Positions positions = LineFit<3>::Positions::Zero();
   std::array<double, most_sets> times{};
   positions.col(1) = match.registration.shift;
@@ -247,7 +313,9 @@ void CloudMotion::follow_line(Cluster& cluster, const Match& match, double time)
     times[k + 1] = sets_[k].time - time;
     const auto at = static_cast<Eigen::Index>(k);
     const Eigen::Vector3d ahead = LineFit<3>(positions, times, num).at(times[k + 1]);
-    const Registration then = register_points(cluster.sample, sets_[k].grid, std::vector{ahead}, 3);
+    const Starts starts = starts_in(cluster, now, sets_[k], ahead);
+    const Sight& sight = starts.is_cut ? sets_[k].sight : everywhere;
+    const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, 3, sight);
     if (!then.is_known()) {
       break;
     }

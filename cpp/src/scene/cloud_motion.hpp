@@ -8,6 +8,7 @@
 #include "point_grid.hpp"
 #include "registration.hpp"
 #include "rest_memory.hpp"
+#include "sidestep/scene/velocity_estimate.hpp"
 
 namespace sidestep {
 
@@ -23,8 +24,8 @@ class CloudMotion {
  public:
   explicit CloudMotion(double largest_speed) : largest_speed_(largest_speed) {}
 
-  /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last.
-  std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time);
+  /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last. sight: see VelocityEstimate.
+  std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time, Sight sight);
   void forget();
 
  private:
@@ -40,6 +41,7 @@ class CloudMotion {
     double time;
     Eigen::Matrix3Xd points;
     PointGrid grid;
+    Sight sight;
     std::vector<Cluster> clusters;
     std::vector<PointMotion> motions;
   };
@@ -48,6 +50,16 @@ class CloudMotion {
     Registration registration;
     bool moved = false;
   };
+  /// The way between the middles of two clusters [m], by what both of their sets could show.
+  struct Way {
+    Eigen::Vector3d shift;
+    bool is_cut = false;  // The end of a sight cuts one of them.
+  };
+  /// Shifts at which a cluster may lie in an earlier set [m].
+  struct Starts {
+    std::vector<Eigen::Vector3d> shifts;
+    bool is_cut = false;  // by the end of a sight
+  };
 
   /// Clusters of what is new, and of what rested before but is not old; what is old rests.
   static void add_clusters(Set& set, const std::vector<char>& is_old, const std::vector<char>& is_new);
@@ -55,15 +67,19 @@ class CloudMotion {
   /// Takes what the oldest set does not have out of clusters that rest: a thing that moves so near to them that they are connected.
   void split(Set& set) const;
   bool is_repeated(const Eigen::Matrix3Xd& points, double time) const;
-  void judge(Cluster& cluster, double time, bool among_few) const;
+  void judge(Cluster& cluster, const Set& set, bool among_few) const;
   /// Whether neither the last set nor the oldest one shows a shift; if so, and in the next two, sets what is known.
   bool rests(Cluster& cluster, double time) const;
   /// The same of one that the last set does not have, by the two sets before.
   bool flickers(Cluster& cluster, double time) const;
   /// Whether few points lie beside what rested for long: its noise.
   bool is_stray(Cluster& cluster) const;
-  Match match(const Cluster& cluster, double time, bool among_few) const;
-  void follow_line(Cluster& cluster, const Match& match, double time) const;
+  /// The way back from a cluster of `now` to one of `then`.
+  Way way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const;
+  /// Where to look for a cluster of `now` in an earlier set, in which it is expected at a shift `ahead` [m].
+  Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead) const;
+  Match match(const Cluster& cluster, const Set& now, bool among_few) const;
+  void follow_line(Cluster& cluster, const Match& match, const Set& now) const;
   void learn_noise(const Set& set);
   void spread_out(Set& set, const std::vector<RestMemory::Rest>& rests);
 

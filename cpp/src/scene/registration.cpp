@@ -20,12 +20,17 @@ struct Offsets {
   std::vector<Eigen::Vector3d> each;  // place of the nearest point − place of the point moved [m]
   std::vector<double> distances;      // [m]
   double cost = 0.0;
+  int in_sight = 0;  // number of points
 };
 
-Offsets offsets_of(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& shift) {
+Offsets offsets_of(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& shift, const Sight& sight) {
   Offsets found;
   for (Eigen::Index n = 0; n < points.cols(); ++n) {
     const Eigen::Vector3d place = points.col(n) + shift;
+    if (sight && !sight(place)) {
+      continue;
+    }
+    ++found.in_sight;
     const PointGrid::Nearest nearest = earlier.nearest(place);
     if (nearest.point >= 0) {
       found.each.push_back(earlier.point(nearest.point) - place);
@@ -33,7 +38,7 @@ Offsets offsets_of(const Eigen::Matrix3Xd& points, const PointGrid& earlier, con
     }
     found.cost += nearest.distance * nearest.distance / (PointGrid::edge * PointGrid::edge);
   }
-  found.cost /= static_cast<double>(points.cols());
+  found.cost /= std::max(1, found.in_sight);
   return found;
 }
 
@@ -60,16 +65,16 @@ Eigen::Vector3d trimmed_mean(const Offsets& offsets, double& deviation) {
 }  // namespace
 
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& start,
-                             int iterations) {
+                             int iterations, const Sight& sight) {
   Registration result{.shift = start};
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (int i = 0;; ++i) {
-    const Offsets offsets = offsets_of(points, earlier, result.shift);
-    result.found = static_cast<double>(offsets.each.size()) / static_cast<double>(points.cols());
-    result.cost = offsets.cost;
-    if (offsets.each.empty()) {
-      return result;
+    const Offsets offsets = offsets_of(points, earlier, result.shift, sight);
+    if (offsets.each.empty() || (sight && offsets.in_sight < few_in_sight)) {
+      return {.shift = result.shift};
     }
+    result.found = static_cast<double>(offsets.each.size()) / offsets.in_sight;
+    result.cost = offsets.cost;
     Eigen::Vector3d step = trimmed_mean(offsets, result.error);
     if (i >= iterations || step.norm() < settled) {
       return result;
@@ -85,17 +90,17 @@ Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& ea
 }
 
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
-                             const std::vector<Eigen::Vector3d>& starts, int iterations) {
+                             const std::vector<Eigen::Vector3d>& starts, int iterations, const Sight& sight) {
   Eigen::Vector3d best = Eigen::Vector3d::Zero();
-  double least = register_points(points, earlier, best, 1).cost / better_ratio - better_by;
+  double least = register_points(points, earlier, best, 1, sight).cost / better_ratio - better_by;
   for (const Eigen::Vector3d& start : starts) {
-    const double cost = least > 0.0 ? register_points(points, earlier, start, 1).cost : 1.0;
+    const double cost = least > 0.0 ? register_points(points, earlier, start, 1, sight).cost : 1.0;
     if (cost < least) {
       least = cost;
       best = start;
     }
   }
-  return register_points(points, earlier, best, iterations);
+  return register_points(points, earlier, best, iterations, sight);
 }
 
 }  // namespace sidestep

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "point_grid.hpp"
+#include "sidestep/scene/velocity_estimate.hpp"
 
 namespace sidestep {
 
@@ -17,14 +18,18 @@ struct Registration {
   bool is_known() const noexcept { return found >= 0.6; }
 };
 
+/// Number of points in sight below which they say nothing, where others are out of it.
+inline constexpr int few_in_sight = 5;
+
 /// Trimmed nearest-neighbour registration: from `start` on, in each of up to `iterations` steps, the shift moves on by the mean offset
 /// to the nearest points of the earlier set; what is 2.5 times farther than the median does not count. A sequence of steps that
-/// shrinks geometrically, as on smooth surfaces, is summed up. No iterations: what `start` is worth.
+/// shrinks geometrically, as on smooth surfaces, is summed up. No iterations: what `start` is worth. Points whose place then was out of
+/// `sight` do not count.
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& start,
-                             int iterations);
+                             int iterations, const Sight& sight = {});
 
 /// The same from the best of several starts, no shift among them: rest goes first, since it needs no motion to explain what is seen.
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
-                             const std::vector<Eigen::Vector3d>& starts, int iterations);
+                             const std::vector<Eigen::Vector3d>& starts, int iterations, const Sight& sight = {});
 
 }  // namespace sidestep

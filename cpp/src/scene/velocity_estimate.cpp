@@ -50,7 +50,7 @@ struct VelocityEstimate::Impl {
     return true;
   }
 
-  Result update(const Obstacles& now, double time) {
+  Result update(const Obstacles& now, double time, Sight sight) {
     const Eigen::Index num = now.size();
     Result result{Eigen::Matrix3Xd::Zero(3, num), Eigen::VectorXd::Constant(num, settings.largest_speed),
                   Eigen::VectorXi::Ones(num)};
@@ -72,7 +72,7 @@ struct VelocityEstimate::Impl {
       begin += count;
     }
     shapes = std::move(seen);
-    take_cloud(now, cloud, time, result);
+    take_cloud(now, cloud, time, std::move(sight), result);
     return result;
   }
 
@@ -91,8 +91,8 @@ struct VelocityEstimate::Impl {
     }
   }
 
-  void take_cloud(const Obstacles& now, const std::vector<Eigen::Index>& cloud, double time, Result& result) {
-    const std::vector<PointMotion> motions = clouds.update(now.points()(Eigen::all, cloud), time);
+  void take_cloud(const Obstacles& now, const std::vector<Eigen::Index>& cloud, double time, Sight sight, Result& result) {
+    const std::vector<PointMotion> motions = clouds.update(now.points()(Eigen::all, cloud), time, std::move(sight));
     for (std::size_t n = 0; n < cloud.size(); ++n) {
       result.velocities.col(cloud[n]) = motions[n].velocity;
       result.uncertainty[cloud[n]] = motions[n].uncertainty;
@@ -109,13 +109,13 @@ VelocityEstimate::~VelocityEstimate() = default;
 VelocityEstimate::VelocityEstimate(VelocityEstimate&&) noexcept = default;
 VelocityEstimate& VelocityEstimate::operator=(VelocityEstimate&&) noexcept = default;
 
-VelocityEstimate::Result VelocityEstimate::update(const Obstacles& now, double time) {
+VelocityEstimate::Result VelocityEstimate::update(const Obstacles& now, double time, Sight sight) {
   require(std::isfinite(time), "time", time, "finite");
   if (!(time > impl_->last)) {
     forget();
   }
   impl_->last = time;
-  return impl_->update(now, time);
+  return impl_->update(now, time, std::move(sight));
 }
 
 void VelocityEstimate::forget() { *impl_ = Impl(impl_->settings); }

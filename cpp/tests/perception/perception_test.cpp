@@ -182,6 +182,38 @@ BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
              0.2);  // cells of 2 cm stand still, images 12 cm apart are compared
 }
 
+BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
+  constexpr double noise = 0.02, period = 0.1;  // [m], [s]
+  camera.fx = camera.fy = 200.0;
+  camera.noise = {noise, 0.0};
+  start();
+  step();
+  std::mt19937 random(1);
+  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
+  scene.floor = -10.0;
+  Eigen::Vector3d& centre = scene.balls.front().centre;
+  for (int n = 0; n < 11; ++n) {  // in the end the border of the image is at the ball's middle
+    centre.y() = 0.25 + 0.5 * period * n;
+    std::vector<float> pixels = scene.image(camera);
+    for (float& depth : pixels) {
+      depth += depth > 0.0f ? error(random) : 0.0f;
+    }
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    time += period;
+    step();
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int num = 0;
+  for (const Perception::Cell& cell : perception->cells()) {
+    if ((cell.centre - centre).norm() < 0.19 && !cell.velocity.isZero(0.0)) {
+      sum += cell.velocity;
+      ++num;
+    }
+  }
+  BOOST_TEST(num > 20);
+  BOOST_TEST((sum / num - Eigen::Vector3d(0.0, 0.5, 0.0)).norm() < 0.1);
+}
+
 BOOST_FIXTURE_TEST_CASE(single_cells_that_come_and_go_hardly_ever_move, Watched) {
   camera.fx = camera.fy = 200.0;
   start();

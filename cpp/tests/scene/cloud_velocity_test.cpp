@@ -304,3 +304,34 @@ BOOST_AUTO_TEST_CASE(ten_thousand_points_take_some_milliseconds) {
   std::sort(durations.begin(), durations.end());
   BOOST_TEST_MESSAGE("10,000 points: median " << durations[20] << " ms, worst " << durations.back() << " ms");
 }
+
+BOOST_AUTO_TEST_CASE(what_leaves_the_sight_of_a_sensor_or_comes_into_it_keeps_its_velocity) {
+  constexpr double radius = 0.12, noise = 0.008;
+  const Sight below = [](const Eigen::Vector3d& place) { return place.z() < 0.5; };
+  const Sight above = [](const Eigen::Vector3d& place) { return place.z() > 0.5; };
+  const Eigen::Vector3d velocity(0.1, 0.2, 0.4);
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    for (const Sight& sight : {below, above}) {
+      double with_sight = 0.0, without = 0.0;
+      for (const bool is_told : {true, false}) {
+        Random random(seed);
+        VelocityEstimate estimate;
+        for (int k = 0; k < 6; ++k) {  // its middle passes the end of the sight
+          const Eigen::Matrix3Xd sphere = ball(random, radius), points = with_noise(random, sphere, noise);
+          const Eigen::Vector3d middle = Eigen::Vector3d(0.0, 0.0, 0.4) + 0.1 * k * velocity;
+          std::vector<Eigen::Index> seen;
+          for (Eigen::Index n = 0; n < points.cols(); ++n) {
+            if (sphere(1, n) < 0.0 && sight(points.col(n) + middle)) {  // its side towards the sensor
+              seen.push_back(n);
+            }
+          }
+          const Eigen::Matrix3Xd shown = points(Eigen::all, seen).colwise() + middle;
+          const VelocityEstimate::Result result = estimate.update(cloud(shown), 0.1 * k, is_told ? sight : Sight());
+          (is_told ? with_sight : without) = Found(result, shown.cols(), velocity).error;
+        }
+      }
+      BOOST_TEST(with_sight < 0.15, "seed " << seed << ": " << with_sight << ", without its sight " << without);
+      BOOST_TEST(with_sight < 0.6 * without);
+    }
+  }
+}

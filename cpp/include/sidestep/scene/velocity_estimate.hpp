@@ -1,11 +1,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 
 #include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
+
+/// Whether a sensor would show something at a place [m]; empty: everywhere.
+using Sight = std::function<bool(const Eigen::Vector3d& place)>;
 
 /// Velocities of obstacles that nobody told, found from one set of obstacles to the next.
 ///
@@ -22,6 +26,9 @@ namespace sidestep {
 ///
 /// Something that is connected with what rests, as nearer to it than 3 to 6 cm, is taken out of it as far as earlier sets do not have
 /// its points; the others count as resting until both are apart or the rest is known for 0.2 s.
+///
+/// What moves out of a sensor's sight, or into it, is cut where the sight ends, and the middle of what is left moves by another velocity.
+/// With the sight of each set, such clusters are compared by what both sets could show.
 ///
 /// Clouds should have a point every 3 cm or nearer. A plane that slides along itself cannot be seen to move. May allocate: belongs in the
 /// thread that sets obstacles, not into a step.
@@ -48,8 +55,8 @@ class VelocityEstimate {
   VelocityEstimate& operator=(VelocityEstimate&&) noexcept;
 
   /// Compares a set, captured at `time` [s], with those before it. A time that is not later than the last one's forgets them first.
-  /// Throws std::invalid_argument if the time is not finite.
-  Result update(const Obstacles& now, double time);
+  /// sight: of the sensor at that time; kept while the set is compared. Throws std::invalid_argument if the time is not finite.
+  Result update(const Obstacles& now, double time, Sight sight = {});
 
   /// The next set is the first.
   void forget();
