@@ -34,18 +34,6 @@ void add_mover(std::vector<Mover>& movers, const Mover& cell) {
   }
 }
 
-/// What a camera sees from a pose X_WC: up to the borders of its image, in its range. The camera must outlive it.
-Sight sight_of(const DepthCamera& camera, const Eigen::Isometry3d& X_WC) {
-  return [&camera, X_CW = Eigen::Isometry3d(X_WC.inverse())](const Eigen::Vector3d& place) {
-    const Eigen::Vector3d p = X_CW * place;
-    if (!(p.z() >= camera.near && p.z() <= camera.far)) {
-      return false;
-    }
-    const Eigen::Vector2d at = camera.project(p);
-    return at.x() >= 0.0 && at.y() >= 0.0 && at.x() <= camera.width - 1 && at.y() <= camera.height - 1;
-  };
-}
-
 /// Drops few cells that can be the noise of what rests, where nothing larger moves: they come and go beside it, and line up now and then.
 void drop_noise(std::vector<Mover>& movers) {
   const auto few = std::partition(movers.begin(), movers.end(), [](const Mover& mover) { return mover.cells > few_cells; });
@@ -161,6 +149,11 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
 void Perception::Impl::find_velocities(View& view, double time) {
   fresh.clear();
   view.movers.clear();
+  // A cell counts from its second image on: it is shown where that one and the one before would show it.
+  auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
+  const Sight sight = [sees, before = std::exchange(view.sight, sees)](const Eigen::Vector3d& place) {
+    return sees->shows(place) && (before == nullptr || before->shows(place));
+  };
   for (const int index : shown) {
     const auto n = static_cast<std::size_t>(index);
     velocities[n].setZero();
@@ -177,7 +170,7 @@ void Perception::Impl::find_velocities(View& view, double time) {
     return;
   }
   const Obstacles candidates = balls(fresh, true);
-  const VelocityEstimate::Result found = view.motion.update(candidates, time, sight_of(view.camera, view.X_WC));
+  const VelocityEstimate::Result found = view.motion.update(candidates, time, sight);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];

@@ -214,6 +214,35 @@ BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
   BOOST_TEST((sum / num - Eigen::Vector3d(0.0, 0.5, 0.0)).norm() < 0.1);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_hardly_ever_moves, Watched) {
+  constexpr double noise = 0.01;  // [m]
+  camera.fx = camera.fy = 200.0;
+  camera.noise = {noise, 0.0};
+  start();
+  std::mt19937 random(1);
+  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
+  int moving = 0, seen = 0;
+  for (int n = 0; n < 60; ++n) {
+    q = Eigen::Vector4d(-0.8 + 0.03 * n, -0.8, 0.5, 1.1);  // 1 rad/s
+    step();
+    scene = {};
+    scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);
+    scene.add_arm(arm.robot(), arm.body(), q);
+    std::vector<float> pixels = scene.image(camera);
+    for (float& depth : pixels) {
+      depth += depth > 0.0f ? error(random) : 0.0f;
+    }
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    time += 0.03;
+    for (const Perception::Cell& cell : perception->cells()) {
+      seen += cell.age > 0.0 ? 0 : 1;
+      moving += cell.velocity.norm() < 0.2 || cell.age > 0.0 ? 0 : 1;
+    }
+  }
+  BOOST_TEST(seen > 10000);
+  BOOST_TEST(moving < 120);  // 256 as long as nobody knew what the arm hides
+}
+
 BOOST_FIXTURE_TEST_CASE(single_cells_that_come_and_go_hardly_ever_move, Watched) {
   camera.fx = camera.fy = 200.0;
   start();
