@@ -26,31 +26,7 @@ constexpr double settled_noise = 2.0;     // Noise of depths that explains a cel
 constexpr double half_diagonal = 0.8661;  // of a cell, in edges
 constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it,
 constexpr double around = 0.35;           // so far from it, in sizes of the box.
-constexpr int widest_shadow = 16;         // Pixels without depth beside the arm, at most: one of two eyes does not see there.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
-
-/// Whether the arm is next to a pixel in a direction, or beyond pixels that fly beside it or have no depth.
-bool meets_arm(const DepthImage& image, int u, int v, int step_u, int step_v) noexcept {
-  for (int n = 0; n <= widest_shadow; ++n) {
-    u += step_u;
-    v += step_v;
-    if (u < 0 || v < 0 || u >= image.width() || v >= image.height()) {
-      return false;
-    }
-    const PixelLabel label = image.labels()[static_cast<std::ptrdiff_t>(v) * image.width() + u];
-    if (label != PixelLabel::nothing && label != PixelLabel::edge) {
-      return label == PixelLabel::arm;
-    }
-  }
-  return false;
-}
-
-/// The same of a run of pixels in a row.
-bool is_beside_arm(const DepthImage& image, int v, std::size_t first, std::size_t last) noexcept {
-  const int u0 = static_cast<int>(first), u1 = static_cast<int>(last), middle = (u0 + u1) / 2;
-  return meets_arm(image, u0, v, -1, 0) || meets_arm(image, u1, v, 1, 0) || meets_arm(image, middle, v, 0, -1) ||
-         meets_arm(image, middle, v, 0, 1);
-}
 
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
 
@@ -78,6 +54,7 @@ void VoxelMap::add(const SeenImage& seen) {
     coordinate->resize(width);
   }
   row_cells_.resize(width);
+  beside_arm_.take(seen.image);
   add_points(seen);
   for (const int index : touched_) {
     end_frame(voxels_[static_cast<std::size_t>(index)], seen);
@@ -165,7 +142,8 @@ void VoxelMap::add_row(const SeenImage& seen, int v) {
       begin_frame(voxel, seen);
     }
     voxel.pixels += static_cast<int>(u - first);
-    if ((voxel.cut_by & bit(seen.number)) == 0 && is_beside_arm(seen.image, v, first, u - 1)) {
+    if ((voxel.cut_by & bit(seen.number)) == 0 &&
+        beside_arm_.is_beside(seen.image, v, static_cast<int>(first), static_cast<int>(u) - 1)) {
       voxel.cut_by |= bit(seen.number);
     }
     voxel.frame_low[0] = std::min(voxel.frame_low[0], low_x);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sidestep/perception/beside_arm.hpp"
 #include "sidestep/perception/depth_camera.hpp"
 #include "sidestep/perception/depth_image.hpp"
 #include "sidestep/perception/perception_settings.hpp"
@@ -124,6 +125,7 @@ class VoxelMap {
   std::vector<int> touched_;                  // Indices of those that the image showed.
   std::vector<float> row_x_, row_y_, row_z_;  // Points of a row of pixels [m], in the world.
   std::vector<int> row_cells_;                // Their cells.
+  BesideArm beside_arm_;                      // in the image
   std::uint32_t frame_ = 0;
 };
 
