@@ -36,7 +36,11 @@ def test_everything_must_hold() -> None:
 
 @pytest.mark.parametrize(
     "said",
-    ["the loop was woken too late: the machine is too busy", "age of the state [s] 0.0506, allowed 0.05"],
+    [
+        "the loop was woken too late: the machine is too busy",
+        "age of the state [s] 0.0506, allowed 0.05",
+        "time without a report of the loop [s] 0.0304, allowed 0.02",
+    ],
 )
 def test_a_case_is_tried_again_only_where_a_busy_machine_came_first(said: str) -> None:
     stopped = replace(GOOD, says_why=False)

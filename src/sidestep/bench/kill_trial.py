@@ -25,7 +25,12 @@ SLACK = 1.02  # of limits: the simulated robot tracks with a small error
 ENCODERS = 1e-3  # [rad] beyond a position limit that is rounding
 NEAR = 0.02  # [rad] from the goal
 #: What a server says where a busy machine has stopped the arm.
-BUSY = ("the machine is too busy", "went without commands for too long", "age of the state")
+BUSY = (
+    "the machine is too busy",
+    "went without commands for too long",
+    "age of the state",
+    "time without a report of the loop",
+)
 
 
 class TrialError(RuntimeError):
@@ -95,15 +100,24 @@ class Trial:
         client.take_command(force=True)
         client.set_goal(GOAL)
 
-    def wait_until_moving(self) -> None:
-        """Waits until the arm is at speed."""
+    def wait_until_moving(self, client: Client | None = None) -> None:
+        """Waits until the arm is at speed.
+
+        client: the one in command, if it is here. It resumes each second: a busy machine may stop the arm first.
+        """
 
         def fast(q: Array, v: Array) -> bool:
             return bool(np.abs(v).max() > MOVING)
 
-        if not self.watcher.look(READY, fast):
-            raise TrialError("the arm did not move")
-        self.outcome.speed = float(np.abs(self.watcher.rows[-1][2]).max())
+        end = time.monotonic() + READY
+        while time.monotonic() < end and self.programs.processes["simulator"].poll() is None:
+            if self.watcher.look(1.0, fast):
+                self.outcome.speed = float(np.abs(self.watcher.rows[-1][2]).max())
+                return
+            if client is not None:
+                client.resume()
+        said = " ".join(self.programs.said("server").split())[-300:]
+        raise TrialError(f"the arm did not move; the server said: {said}")
 
     def watch_rest(self, killed: float) -> None:
         """Watches until the arm has been at rest for a while, and judges the way there."""
@@ -152,7 +166,7 @@ class Trial:
             return bool(np.abs(q - GOAL).max() < NEAR)
 
         while time.monotonic() < end:
-            client.resume()  # again each second: a busy machine may stop the arm once more
+            client.resume()  # as in `wait_until_moving`
             if self.watcher.look(1.0, there):
                 self.outcome.resumed = True
                 return

@@ -34,6 +34,7 @@ from sidestep.bench.kill_trial import (
 
 CLOCK_JUMP = 5.0  # [s]
 MOST_TRIES = 3  # of a case that a busy machine disturbs
+UNTRIED = (RuntimeError, OSError, ValueError, subprocess.SubprocessError)  # what a case that does not come about raises
 
 CLIENT = """
 import sys, time
@@ -41,7 +42,9 @@ from sidestep.link import connect
 client = connect(sys.argv[1], name="planner", rate=100.0, timeout=10.0)
 client.take_command()
 client.set_goal([float(q) for q in sys.argv[2].split(",")])
-time.sleep(600.0)
+while True:
+    time.sleep(1.0)
+    client.resume()
 """
 
 CAMERA = """
@@ -76,7 +79,7 @@ def _server(trial: Trial) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed, at = time.monotonic(), trial.watcher.robot_time
         programs.kill("server")
         trial.watch_rest(killed)
@@ -91,7 +94,7 @@ def _simulator(trial: Trial) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed = time.monotonic()
         programs.kill("simulator")
         programs.processes["simulator"].wait()
@@ -111,7 +114,7 @@ def _supervisor(trial: Trial) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed = time.monotonic()
         os.kill(programs.supervisor(), signal.SIGKILL)
         trial.watch_rest(killed)
@@ -123,7 +126,7 @@ def _interrupt(trial: Trial) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed, at = time.monotonic(), trial.watcher.robot_time
         programs.kill("server", signal.SIGINT)
         trial.watch_rest(killed)
@@ -145,7 +148,7 @@ def _jump_of_clock(trial: Trial, words: str) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed = time.monotonic()
         programs.kill("simulator", signal.SIGUSR1)
         trial.watch_rest(killed)
@@ -158,8 +161,11 @@ def _network(trial: Trial) -> None:
     programs = trial.programs
     with programs.connect("planner") as client:
         trial.lead(client)
-        end = time.monotonic() + READY
+        end, next_resume = time.monotonic() + READY, time.monotonic() + 1.0
         while np.abs(client.state().v).max() < MOVING and time.monotonic() < end:
+            if time.monotonic() > next_resume:
+                client.resume()
+                next_resume += 1.0
             time.sleep(0.005)
         trial.outcome.speed = float(np.abs(client.state().v).max())
         programs.set_network("down")
@@ -181,7 +187,7 @@ def _camera(trial: Trial) -> None:
     camera = programs.run("camera", CAMERA)
     with programs.connect("planner") as client:
         trial.lead(client)
-        trial.wait_until_moving()
+        trial.wait_until_moving(client)
         killed = time.monotonic()
         camera.kill()
         trial.watch_rest(killed)
@@ -241,7 +247,7 @@ def run_case(case: str, number: int) -> KillOutcome:
                 own_network(case == "network") as prefix,
             ):
                 said = _run(_programs(Path(folder), case, prefix), outcome)
-        except (RuntimeError, OSError, ValueError, subprocess.SubprocessError) as error:
+        except UNTRIED as error:
             outcome.error = f"{type(error).__name__}: {error}"
         if not outcome.was_disturbed(said):
             break
@@ -265,6 +271,8 @@ def _run(programs: Programs, outcome: KillOutcome) -> str:
             CASES[outcome.case](trial)
         except TrialError as error:
             outcome.error = str(error)
+        except UNTRIED as error:
+            outcome.error = f"{type(error).__name__}: {error}"
         if trial.seen is not None:
             trial.seen.close()
         return programs.said("server")
