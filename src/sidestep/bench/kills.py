@@ -34,7 +34,8 @@ from sidestep.bench.kill_trial import (
 
 CLOCK_JUMP = 5.0  # [s]
 MOST_TRIES = 3  # of a case that a busy machine disturbs
-UNTRIED = (RuntimeError, OSError, ValueError, subprocess.SubprocessError)  # what a case that does not come about raises
+#: What a case raises that does not come about.
+UNTRIED = (RuntimeError, OSError, ValueError, subprocess.SubprocessError)
 
 CLIENT = """
 import sys, time
