@@ -152,7 +152,8 @@ void bind_depth_camera(nb::module_& m) {
              return to_numpy_matrix(pixels);
            },
            nb::arg("points"), nb::sig("def project(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
-           "Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image.")
+           "Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image. NaN: so far from the "
+           "axis that the distortion's polynomial no longer holds.")
       .def("__repr__", [](const DepthCamera& c) {
         return "DepthCamera('" + c.name + "', " + std::to_string(c.width) + " × " + std::to_string(c.height) +
                (c.link.empty() ? "" : ", on '" + c.link + "'") + ")";

@@ -4071,7 +4071,7 @@ class DepthCamera:
 
     def project(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image.
+        Pixels (N, 2) that see points (N, 3) of the optical frame, with z > 0; they may lie outside of the image. NaN: so far from the axis that the distortion's polynomial no longer holds.
         """
 
     def __repr__(self) -> str: ...

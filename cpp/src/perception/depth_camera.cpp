@@ -11,6 +11,9 @@ namespace {
 
 constexpr int most_pixels_of_side = 16384;  // Width or height, at most.
 constexpr int undistort_rounds = 30;        // Rounds of the fixed-point iteration that inverts a distortion.
+constexpr double undistorted = 1e-12;       // What is left when it ends [-].
+constexpr double not_undistorted = 1e-3;    // What is left where it has found nothing [-].
+constexpr int steps_of_growth = 16;         // at which the slope of a distortion is looked at
 
 [[noreturn]] void refuse_camera(const DepthCamera& camera, const std::string& what) {
   throw std::invalid_argument("camera '" + camera.name + "': " + what);
@@ -30,12 +33,32 @@ double fisheye_angle(const std::array<double, 5>& k, double theta) noexcept {
   return theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
 }
 
+/// Whether r (1 + k1 r² + …) grows from 0 to a radius or an angle r. From where it turns back, it folds onto what is seen.
+template <std::size_t num>
+bool grows(const std::array<double, num>& k, double r) noexcept {
+  for (int step = 1; step <= steps_of_growth; ++step) {
+    const double x = r * step / steps_of_growth;
+    double slope = 0.0;
+    for (std::size_t n = num; n > 0; --n) {
+      slope = x * x * (slope + static_cast<double>(2 * n + 1) * k[n - 1]);
+    }
+    if (!(1.0 + slope > 0.0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// The point that `move` moves to a given one, near it.
 template <class Move>
 Eigen::Vector2d undo(const Eigen::Vector2d& moved, Move&& move) noexcept {
   Eigen::Vector2d point = moved;
   for (int round = 0; round < undistort_rounds; ++round) {
-    point += moved - move(point.x(), point.y());
+    const Eigen::Vector2d off = moved - move(point.x(), point.y());
+    point += off;
+    if (off.squaredNorm() < undistorted * undistorted) {
+      break;
+    }
   }
   return point;
 }
@@ -93,18 +116,29 @@ void DepthCamera::validate() const {
 }
 
 Eigen::Vector2d DepthCamera::project(const Eigen::Vector3d& p) const noexcept {
-  Eigen::Vector2d point = p.head<2>() / p.z();
+  const Eigen::Vector2d ray = p.head<2>() / p.z();
+  const std::array<double, 5>& k = distortion;
+  Eigen::Vector2d point = ray;
+  bool is_seen = true;
   switch (distortion_model) {
     case DistortionModel::none: break;
-    case DistortionModel::brown_conrady: point = brown_conrady(distortion, point.x(), point.y()); break;
+    case DistortionModel::brown_conrady:
+      point = brown_conrady(k, ray.x(), ray.y());
+      is_seen = grows(std::array{k[0], k[1], k[4]}, ray.norm());
+      break;
     case DistortionModel::inverse_brown_conrady:
-      point = undo(point, [this](double x, double y) { return brown_conrady(distortion, x, y); });
+      point = undo(ray, [&k](double x, double y) { return brown_conrady(k, x, y); });
+      is_seen = (brown_conrady(k, point.x(), point.y()) - ray).norm() < not_undistorted;
       break;
     case DistortionModel::kannala_brandt:
-      if (const double r = point.norm(); r > 1e-9) {
-        point *= fisheye_angle(distortion, std::atan(r)) / r;
+      if (const double r = ray.norm(), angle = std::atan(r); r > 1e-9) {
+        point *= fisheye_angle(k, angle) / r;
+        is_seen = grows(std::array{k[0], k[1], k[2], k[3]}, angle);
       }
       break;
+  }
+  if (!is_seen) {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
   return {fx * point.x() + cx, fy * point.y() + cy};
 }

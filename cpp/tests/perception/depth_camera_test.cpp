@@ -48,6 +48,24 @@ BOOST_AUTO_TEST_CASE(a_lens_moves_points_as_its_polynomial_says) {
   BOOST_TEST(pixel.y() == 120.0 * 0.01 * 0.25 + 59.5, boost::test_tools::tolerance(1e-12));
 }
 
+BOOST_AUTO_TEST_CASE(what_is_far_outside_of_the_view_is_not_folded_back_into_the_image) {
+  DepthCamera camera = test::small_camera({1.0, 0.0, 1.0}, {0.0, 0.0, 0.0});
+  camera.fx = camera.fy = 200.0;
+  camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
+  for (const DistortionModel model :
+       {DistortionModel::brown_conrady, DistortionModel::inverse_brown_conrady, DistortionModel::kannala_brandt}) {
+    camera.distortion_model = model;
+    const Eigen::Vector2d corner = camera.ray(159.0, 119.0);
+    BOOST_TEST(camera.project({corner.x(), corner.y(), 1.0}).allFinite());
+    int folded = 0;
+    for (double x = camera.ray(159.0, 59.5).x() + 0.01; x < 10.0; x += 0.01) {
+      const Eigen::Vector2d pixel = camera.project({x, 0.0, 1.0});
+      folded += pixel.array().isNaN().all() || pixel.x() > 159.0 ? 0 : 1;
+    }
+    BOOST_TEST(folded == 0);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_window_holds_all_rays_between_its_bounds) {
   const DepthCamera camera = test::small_camera({1.0, 0.0, 1.0}, {0.0, 0.0, 0.0});
   const CameraRays rays(camera);

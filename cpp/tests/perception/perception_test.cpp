@@ -110,6 +110,30 @@ BOOST_FIXTURE_TEST_CASE(what_the_arm_hides_is_remembered, Watched) {
   BOOST_TEST(points("memory", {0.2, 0.9, 0.5}, 0.17) > 10);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_is_outside_of_the_view_of_a_distorting_lens_is_not_seen_free, Watched) {
+  camera.distortion_model = DistortionModel::brown_conrady;
+  camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
+  settings.memory = 100.0;
+  start();
+  step();
+  const Eigen::Vector3d ball(0.2, 0.9, 0.5);
+  for (int n = 0; n < 30; ++n) {
+    look();
+  }
+  const int seen = points("front", ball, 0.17);
+  BOOST_TEST(seen > 10);
+  const Eigen::Vector3d to = camera.pose.inverse() * ball;
+  for (int n = 0; n < 10; ++n) {  // it turns away until the ball is at x/z = 1.7, and sees far
+    const Eigen::Isometry3d turned =
+        camera.pose * Eigen::AngleAxisd(std::atan2(to.x(), to.z()) - std::atan(1.7), Eigen::Vector3d::UnitY());
+    const std::vector<float> pixels(160 * 120, 3.9f);
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, turned});
+    time += 0.03;
+    step();
+  }
+  BOOST_TEST(points("memory", ball, 0.17) > seen / 2);
+}
+
 BOOST_FIXTURE_TEST_CASE(told_shapes_explain_their_points_and_regions_are_left_out, Watched) {
   start();
   step();

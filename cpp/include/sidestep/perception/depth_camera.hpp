@@ -45,7 +45,8 @@ struct DepthCamera {
   /// Throws std::invalid_argument that names the value and what is allowed.
   void validate() const;
 
-  /// The pixel (u, v) that sees a point p (optical frame, p.z > 0); it may lie outside of the image.
+  /// The pixel (u, v) that sees a point p (optical frame, p.z > 0); it may lie outside of the image. NaN: so far from the axis that the
+  /// distortion's polynomial no longer holds. It would fold the point back into the image.
   Eigen::Vector2d project(const Eigen::Vector3d& p) const noexcept;
   /// x and y of the ray (x, y, 1) of a pixel.
   Eigen::Vector2d ray(double u, double v) const noexcept;
