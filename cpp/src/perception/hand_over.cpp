@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "image_sight.hpp"
 #include "impl.hpp"
 #include "nearby.hpp"
 
@@ -149,11 +150,8 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
 void Perception::Impl::find_velocities(View& view, double time) {
   fresh.clear();
   view.movers.clear();
-  // A cell counts from its second image on: it is shown where that one and the one before would show it.
-  auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
-  const Sight sight = [sees, before = std::exchange(view.sight, sees)](const Eigen::Vector3d& place) {
-    return sees->shows(place) && (before == nullptr || before->shows(place));
-  };
+  const auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
+  const Sight sight = [sees](const Eigen::Vector3d& place) { return sees->shows(place); };
   for (const int index : shown) {
     const auto n = static_cast<std::size_t>(index);
     velocities[n].setZero();

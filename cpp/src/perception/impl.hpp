@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cell_ball.hpp"
-#include "image_sight.hpp"
 #include "reach.hpp"
 #include "sidestep/perception/perception.hpp"
 #include "sidestep/perception/steady_depth.hpp"
@@ -50,7 +49,6 @@ struct Perception::Impl {
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows
     std::vector<Mover> movers;                                 // in its last image
-    std::shared_ptr<const ImageSight> sight;                   // of its last image; nullptr: there is none
   };
   struct Region {
     std::string name;

@@ -228,7 +228,6 @@ void Perception::forget() {
     view.begin = std::numeric_limits<double>::quiet_NaN();
     view.motion.forget();
     view.movers.clear();
-    view.sight.reset();
     view.steady.forget();
   }
 }

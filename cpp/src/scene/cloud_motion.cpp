@@ -216,24 +216,24 @@ bool CloudMotion::is_stray(Cluster& cluster) const {
 }
 
 CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const {
-  Way way{other.middle - cluster.middle};
+  Way way{.shift = other.middle - cluster.middle};
   if (!now.sight || !then.sight) {
     return way;
   }
   const Eigen::Matrix3Xd &points = cluster.sample, &earlier = other.sample;
   // From the sights' ends a shift that is wrong by e goes on with an error of e/2 or less.
-  Eigen::Vector3d shift = way.shift;
+  Eigen::Vector3d shift = *way.shift;
   for (int k = 0; k < cut_iterations; ++k) {
     Eigen::Vector3d here = Eigen::Vector3d::Zero(), there = here;
     int num_here = 0, num_there = 0;
     for (Eigen::Index n = 0; n < points.cols(); ++n) {
-      if (then.sight(points.col(n) + shift)) {
+      if (now.sight(points.col(n)) && then.sight(points.col(n) + shift)) {
         here += points.col(n);
         ++num_here;
       }
     }
     for (Eigen::Index n = 0; n < earlier.cols(); ++n) {
-      if (now.sight(earlier.col(n) - shift)) {
+      if (then.sight(earlier.col(n)) && now.sight(earlier.col(n) - shift)) {
         there += earlier.col(n);
         ++num_there;
       }
@@ -241,10 +241,11 @@ CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, c
     if (num_here == points.cols() && num_there == earlier.cols()) {
       break;
     }
+    way.is_cut = true;
     if (num_here < few_in_sight || num_there < few_in_sight) {
+      way.shift.reset();
       return way;
     }
-    way.is_cut = true;
     shift = there / num_there - here / num_here;
   }
   if (way.is_cut && shift.norm() <= largest_speed_ * (now.time - then.time)) {
@@ -254,9 +255,9 @@ CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, c
 }
 
 CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& now, const Set& then,
-                                           const Eigen::Vector3d& ahead) const {
+                                           const Eigen::Vector3d& ahead, bool has_moved) const {
   if (cluster.points.size() <= stray_points) {  // their middle is their noise
-    return {{ahead}};
+    return {.shifts = {ahead}};
   }
   const Eigen::Vector3d place = cluster.middle + ahead;
   const Cluster* nearest = nullptr;
@@ -266,11 +267,20 @@ CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& no
       nearest = &other;
     }
   }
-  if (nearest == nullptr) {
-    return {{ahead}};
+  Starts starts;
+  Way way;
+  if (nearest != nullptr) {
+    way = way_back(cluster, now, *nearest, then);
   }
-  const Way way = way_back(cluster, now, *nearest, then);
-  return way.is_cut ? Starts{{way.shift}, true} : Starts{{way.shift, ahead}};
+  if (way.shift) {
+    starts.shifts.push_back(*way.shift);
+  }
+  // What is not known to move has slid in the newer set, too, where a sight's end cuts it.
+  if (!way.is_cut || !way.shift || has_moved) {
+    starts.shifts.push_back(ahead);
+  }
+  starts.is_cut = way.is_cut;
+  return starts;
 }
 
 CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bool among_few) const {
@@ -290,14 +300,17 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bo
     }
     const Way common = way_back(cluster, now, other, last);
     const bool moved = !other.motion.velocity.isZero(0.0);
-    starts.shifts.push_back(common.shift);
+    if (common.shift) {
+      starts.shifts.push_back(*common.shift);
+    }
     starts.is_cut = starts.is_cut || common.is_cut;
-    if (moved && !common.is_cut) {
+    if (moved) {
       starts.shifts.push_back(-duration * other.motion.velocity);
     }
     best.moved = best.moved || moved;
   }
-  best.registration = register_points(cluster.sample, last.grid, starts.shifts, 5, starts.is_cut ? last.sight : everywhere);
+  const Sight& sight = starts.is_cut ? last.sight : everywhere;
+  best.registration = register_points(cluster.sample, last.grid, starts.shifts, best.moved, 5, sight);
   return best;
 }
 
@@ -313,9 +326,9 @@ void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& n
     times[k + 1] = sets_[k].time - time;
     const auto at = static_cast<Eigen::Index>(k);
     const Eigen::Vector3d ahead = LineFit<3>(positions, times, num).at(times[k + 1]);
-    const Starts starts = starts_in(cluster, now, sets_[k], ahead);
+    const Starts starts = starts_in(cluster, now, sets_[k], ahead, match.moved);
     const Sight& sight = starts.is_cut ? sets_[k].sight : everywhere;
-    const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, 3, sight);
+    const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, match.moved, 3, sight);
     if (!then.is_known()) {
       break;
     }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "line_fit.hpp"
@@ -52,8 +53,8 @@ class CloudMotion {
   };
   /// The way between the middles of two clusters [m], by what both of their sets could show.
   struct Way {
-    Eigen::Vector3d shift;
-    bool is_cut = false;  // The end of a sight cuts one of them.
+    std::optional<Eigen::Vector3d> shift = std::nullopt;  // none: too little of them is what both could show
+    bool is_cut = false;                                  // The end of a sight cuts one of them.
   };
   /// Shifts at which a cluster may lie in an earlier set [m].
   struct Starts {
@@ -76,8 +77,8 @@ class CloudMotion {
   bool is_stray(Cluster& cluster) const;
   /// The way back from a cluster of `now` to one of `then`.
   Way way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const;
-  /// Where to look for a cluster of `now` in an earlier set, in which it is expected at a shift `ahead` [m].
-  Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead) const;
+  /// Where to look for a cluster of `now`, which may have moved, in an earlier set, in which it is expected at a shift `ahead` [m].
+  Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead, bool has_moved) const;
   Match match(const Cluster& cluster, const Set& now, bool among_few) const;
   void follow_line(Cluster& cluster, const Match& match, const Set& now) const;
   void learn_noise(const Set& set);

@@ -29,7 +29,9 @@ Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& ea
                              int iterations, const Sight& sight = {});
 
 /// The same from the best of several starts, no shift among them: rest goes first, since it needs no motion to explain what is seen.
+/// Of what `has_moved` before, motion need not explain so much more.
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
-                             const std::vector<Eigen::Vector3d>& starts, int iterations, const Sight& sight = {});
+                             const std::vector<Eigen::Vector3d>& starts, bool has_moved, int iterations,
+                             const Sight& sight = {});
 
 }  // namespace sidestep

@@ -267,6 +267,40 @@ BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_hardly_ever_moves, Watched) {
   BOOST_TEST(moving < 120);  // 256 as long as nobody knew what the arm hides
 }
 
+BOOST_FIXTURE_TEST_CASE(what_moves_while_the_arm_covers_or_uncovers_it_has_its_velocity, Watched) {
+  constexpr double speed = 0.4, period = 0.05;  // [m/s], [s]
+  constexpr int images = 30, partly = 10;       // of which the arm hides a part in the last or the first ones
+  camera.fx = camera.fy = 200.0;
+  for (const bool covers : {true, false}) {
+    start();
+    double error = 0.0;
+    int num = 0, moving = 0;
+    for (int n = 0; n < images; ++n) {
+      const int k = covers ? n : images - 1 - n;
+      const bool counts = covers ? n >= images - partly : n >= partly / 2 && n < partly * 3 / 2;
+      q = Eigen::Vector4d(-0.6 + period * k, -0.8, 0.5, 1.1);
+      step();
+      const Eigen::Vector3d centre(-0.3, -0.6 + period * speed * k, 0.6), velocity(0.0, covers ? speed : -speed, 0.0);
+      scene = {};
+      scene.add_sphere(centre, 0.15);
+      scene.add_sphere({-102.0, 0.0, 0.6}, 100.0);
+      scene.add_arm(arm.robot(), arm.body(), q);
+      look(Capture{time, {}, std::nullopt});
+      time += period;
+      for (const Perception::Cell& cell : perception->cells()) {
+        if (counts && cell.age == 0.0 && (cell.centre - centre).norm() < 0.17) {
+          error += (cell.velocity - velocity).norm();
+          moving += cell.velocity.isZero(0.0) ? 0 : 1;
+          ++num;
+        }
+      }
+    }
+    BOOST_TEST(num > 1000);
+    BOOST_TEST(moving > 0.75 * num, "covers " << covers << ": " << moving << " of " << num << " cells move");
+    BOOST_TEST(error < 0.14 * num, "covers " << covers << ": velocities are off by " << error / num << " m/s");
+  }
+}
+
 BOOST_FIXTURE_TEST_CASE(single_cells_that_come_and_go_hardly_ever_move, Watched) {
   camera.fx = camera.fy = 200.0;
   start();

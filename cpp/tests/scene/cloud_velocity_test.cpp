@@ -335,3 +335,29 @@ BOOST_AUTO_TEST_CASE(what_leaves_the_sight_of_a_sensor_or_comes_into_it_keeps_it
     }
   }
 }
+
+BOOST_AUTO_TEST_CASE(what_is_uncovered_keeps_its_velocity_though_more_of_it_is_shown_than_its_sight_tells) {
+  constexpr double radius = 0.12, noise = 0.005, period = 0.1, wider = 0.05;
+  const Eigen::Vector3d velocity(0.4, 0.0, 0.0);
+  double sum = 0.0;
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    Random random(seed);
+    VelocityEstimate estimate;
+    for (int k = 0; k < 5; ++k) {  // the end of the sight, at rest and as fast as the ball in turn, passes its middle
+      const double end = 0.1 - 0.02 * seed + (seed % 2 == 0 ? 0.0 : 0.8 * period * k - 0.15);
+      const Eigen::Vector3d middle = period * k * velocity;
+      const Eigen::Matrix3Xd sphere = ball(random, radius), points = with_noise(random, sphere, noise);
+      std::vector<Eigen::Index> seen;
+      for (Eigen::Index n = 0; n < points.cols(); ++n) {
+        if (sphere(1, n) < 0.0 && points(0, n) + middle.x() < end + wider) {
+          seen.push_back(n);
+        }
+      }
+      const Eigen::Matrix3Xd shown = points(Eigen::all, seen).colwise() + middle;
+      const VelocityEstimate::Result result =
+          estimate.update(cloud(shown), period * k, [end](const Eigen::Vector3d& place) { return place.x() < end; });
+      sum += k == 4 ? Found(result, shown.cols(), velocity).error : 0.0;
+    }
+  }
+  BOOST_TEST(sum / 6 < 0.1);
+}
