@@ -13,6 +13,7 @@ constexpr int most_pixels_of_side = 16384;  // Width or height, at most.
 constexpr int undistort_rounds = 30;        // Rounds of the fixed-point iteration that inverts a distortion.
 constexpr double undistorted = 1e-12;       // What is left when it ends [-].
 constexpr double not_undistorted = 1e-3;    // What is left where it has found nothing [-].
+constexpr double same_pixel = 0.5;          // Distance of a pixel and the one that its ray leads to [pixel].
 constexpr int steps_of_growth = 16;         // at which the slope of a distortion is looked at
 
 [[noreturn]] void refuse_camera(const DepthCamera& camera, const std::string& what) {
@@ -113,6 +114,17 @@ void DepthCamera::validate() const {
     refuse_camera(*this, "pose has numbers that are not finite");
   }
   check_rotation(pose.linear(), "camera '" + name + "'");
+  for (const double u : {0.0, width - 1.0}) {
+    for (const double v : {0.0, height - 1.0}) {
+      const Eigen::Vector2d at = ray(u, v), back = project({at.x(), at.y(), 1.0});
+      if (distortion_model == DistortionModel::brown_conrady && !((back - Eigen::Vector2d(u, v)).norm() < same_pixel)) {
+        refuse_camera(
+            *this,
+            "pixel (" + std::to_string(static_cast<int>(u)) + ", " + std::to_string(static_cast<int>(v)) +
+                ") has no ray: the distortion turns back within the image; allowed: coefficients that hold in its corners");
+      }
+    }
+  }
 }
 
 Eigen::Vector2d DepthCamera::project(const Eigen::Vector3d& p) const noexcept {

@@ -217,28 +217,37 @@ bool CloudMotion::is_stray(Cluster& cluster) const {
 
 CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const {
   Way way{.shift = other.middle - cluster.middle};
-  if (!now.sight || !then.sight) {
+  if (!now.sight || !then.sight || cluster.sample.cols() < few_in_sight || other.sample.cols() < few_in_sight) {
     return way;
   }
-  const Eigen::Matrix3Xd &points = cluster.sample, &earlier = other.sample;
+  const auto in_its_sight = [](const Cluster& its, const Sight& sight) {
+    std::vector<Eigen::Vector3d> points;
+    for (Eigen::Index n = 0; n < its.sample.cols(); ++n) {
+      if (sight(its.sample.col(n))) {
+        points.emplace_back(its.sample.col(n));
+      }
+    }
+    return points;
+  };
+  const std::vector<Eigen::Vector3d> points = in_its_sight(cluster, now.sight), earlier = in_its_sight(other, then.sight);
   // From the sights' ends a shift that is wrong by e goes on with an error of e/2 or less.
   Eigen::Vector3d shift = *way.shift;
   for (int k = 0; k < cut_iterations; ++k) {
     Eigen::Vector3d here = Eigen::Vector3d::Zero(), there = here;
     int num_here = 0, num_there = 0;
-    for (Eigen::Index n = 0; n < points.cols(); ++n) {
-      if (now.sight(points.col(n)) && then.sight(points.col(n) + shift)) {
-        here += points.col(n);
+    for (const Eigen::Vector3d& point : points) {
+      if (then.sight(point + shift)) {
+        here += point;
         ++num_here;
       }
     }
-    for (Eigen::Index n = 0; n < earlier.cols(); ++n) {
-      if (then.sight(earlier.col(n)) && now.sight(earlier.col(n) - shift)) {
-        there += earlier.col(n);
+    for (const Eigen::Vector3d& point : earlier) {
+      if (now.sight(point - shift)) {
+        there += point;
         ++num_there;
       }
     }
-    if (num_here == points.cols() && num_there == earlier.cols()) {
+    if (num_here == cluster.sample.cols() && num_there == other.sample.cols()) {
       break;
     }
     way.is_cut = true;
@@ -257,7 +266,7 @@ CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, c
 CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& now, const Set& then,
                                            const Eigen::Vector3d& ahead, bool has_moved) const {
   if (cluster.points.size() <= stray_points) {  // their middle is their noise
-    return {.shifts = {ahead}};
+    return {.shifts = {{ahead, has_moved}}};
   }
   const Eigen::Vector3d place = cluster.middle + ahead;
   const Cluster* nearest = nullptr;
@@ -273,11 +282,11 @@ CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& no
     way = way_back(cluster, now, *nearest, then);
   }
   if (way.shift) {
-    starts.shifts.push_back(*way.shift);
+    starts.shifts.push_back({*way.shift, has_moved});
   }
   // What is not known to move has slid in the newer set, too, where a sight's end cuts it.
   if (!way.is_cut || !way.shift || has_moved) {
-    starts.shifts.push_back(ahead);
+    starts.shifts.push_back({ahead, has_moved});
   }
   starts.is_cut = way.is_cut;
   return starts;
@@ -301,16 +310,16 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bo
     const Way common = way_back(cluster, now, other, last);
     const bool moved = !other.motion.velocity.isZero(0.0);
     if (common.shift) {
-      starts.shifts.push_back(*common.shift);
+      starts.shifts.push_back({*common.shift, moved});
     }
     starts.is_cut = starts.is_cut || common.is_cut;
     if (moved) {
-      starts.shifts.push_back(-duration * other.motion.velocity);
+      starts.shifts.push_back({-duration * other.motion.velocity, true});
     }
     best.moved = best.moved || moved;
   }
-  const Sight& sight = starts.is_cut ? last.sight : everywhere;
-  best.registration = register_points(cluster.sample, last.grid, starts.shifts, best.moved, 5, sight);
+  const Sight& sight = starts.is_cut && cluster.sample.cols() >= few_in_sight ? last.sight : everywhere;
+  best.registration = register_points(cluster.sample, last.grid, starts.shifts, 5, sight);
   return best;
 }
 
@@ -328,7 +337,7 @@ void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& n
     const Eigen::Vector3d ahead = LineFit<3>(positions, times, num).at(times[k + 1]);
     const Starts starts = starts_in(cluster, now, sets_[k], ahead, match.moved);
     const Sight& sight = starts.is_cut ? sets_[k].sight : everywhere;
-    const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, match.moved, 3, sight);
+    const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, 3, sight);
     if (!then.is_known()) {
       break;
     }

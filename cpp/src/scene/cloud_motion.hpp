@@ -58,7 +58,7 @@ class CloudMotion {
   };
   /// Shifts at which a cluster may lie in an earlier set [m].
   struct Starts {
-    std::vector<Eigen::Vector3d> shifts;
+    std::vector<Start> shifts;
     bool is_cut = false;  // by the end of a sight
   };
 
@@ -77,7 +77,8 @@ class CloudMotion {
   bool is_stray(Cluster& cluster) const;
   /// The way back from a cluster of `now` to one of `then`.
   Way way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const;
-  /// Where to look for a cluster of `now`, which may have moved, in an earlier set, in which it is expected at a shift `ahead` [m].
+  /// Where to look for a cluster of `now` in an earlier set, in which it is expected at a shift `ahead` [m]. has_moved: it, or what was
+  /// beside it, moved in the last set.
   Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead, bool has_moved) const;
   Match match(const Cluster& cluster, const Set& now, bool among_few) const;
   void follow_line(Cluster& cluster, const Match& match, const Set& now) const;

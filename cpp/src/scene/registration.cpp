@@ -89,15 +89,16 @@ Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& ea
   }
 }
 
-Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
-                             const std::vector<Eigen::Vector3d>& starts, bool has_moved, int iterations, const Sight& sight) {
+Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const std::vector<Start>& starts,
+                             int iterations, const Sight& sight) {
   Eigen::Vector3d best = Eigen::Vector3d::Zero();
-  double least = register_points(points, earlier, best, 1, sight).cost / better_ratio - (has_moved ? 0.0 : better_by);
-  for (const Eigen::Vector3d& start : starts) {
-    const double cost = least > 0.0 ? register_points(points, earlier, start, 1, sight).cost : 1.0;
+  double least = register_points(points, earlier, best, 1, sight).cost / better_ratio;
+  for (const Start& start : starts) {
+    const double more = start.goes_on ? 0.0 : better_by;
+    const double cost = least > more ? register_points(points, earlier, start.shift, 1, sight).cost + more : 1.0;
     if (cost < least) {
       least = cost;
-      best = start;
+      best = start.shift;
     }
   }
   return register_points(points, earlier, best, iterations, sight);

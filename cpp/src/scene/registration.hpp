@@ -28,10 +28,15 @@ inline constexpr int few_in_sight = 5;
 Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const Eigen::Vector3d& start,
                              int iterations, const Sight& sight = {});
 
+/// A shift that a registration may start from.
+struct Start {
+  Eigen::Vector3d shift;  ///< [m]
+  bool goes_on = false;   ///< of what moved before
+};
+
 /// The same from the best of several starts, no shift among them: rest goes first, since it needs no motion to explain what is seen.
-/// Of what `has_moved` before, motion need not explain so much more.
-Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier,
-                             const std::vector<Eigen::Vector3d>& starts, bool has_moved, int iterations,
-                             const Sight& sight = {});
+/// A motion that goes on needs to explain more than rest, too, but not by as much.
+Registration register_points(const Eigen::Matrix3Xd& points, const PointGrid& earlier, const std::vector<Start>& starts,
+                             int iterations, const Sight& sight = {});
 
 }  // namespace sidestep

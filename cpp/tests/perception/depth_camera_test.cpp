@@ -4,6 +4,8 @@
 #include <boost/test/unit_test.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "support/depth_scene.hpp"
 
@@ -51,12 +53,14 @@ BOOST_AUTO_TEST_CASE(a_lens_moves_points_as_its_polynomial_says) {
 BOOST_AUTO_TEST_CASE(what_is_far_outside_of_the_view_is_not_folded_back_into_the_image) {
   DepthCamera camera = test::small_camera({1.0, 0.0, 1.0}, {0.0, 0.0, 0.0});
   camera.fx = camera.fy = 200.0;
-  camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
-  for (const DistortionModel model :
-       {DistortionModel::brown_conrady, DistortionModel::inverse_brown_conrady, DistortionModel::kannala_brandt}) {
+  const std::vector<std::pair<DistortionModel, double>> lenses = {{DistortionModel::brown_conrady, -0.3},
+                                                                  {DistortionModel::inverse_brown_conrady, 0.3},
+                                                                  {DistortionModel::kannala_brandt, -0.4}};
+  for (const auto& [model, k1] : lenses) {
     camera.distortion_model = model;
+    camera.distortion = {k1, 0.0, 0.0, 0.0, 0.0};
     const Eigen::Vector2d corner = camera.ray(159.0, 119.0);
-    BOOST_TEST(camera.project({corner.x(), corner.y(), 1.0}).allFinite());
+    BOOST_TEST((camera.project({corner.x(), corner.y(), 1.0}) - Eigen::Vector2d(159.0, 119.0)).norm() < 1e-6);
     int folded = 0;
     for (double x = camera.ray(159.0, 59.5).x() + 0.01; x < 10.0; x += 0.01) {
       const Eigen::Vector2d pixel = camera.project({x, 0.0, 1.0});
@@ -64,6 +68,16 @@ BOOST_AUTO_TEST_CASE(what_is_far_outside_of_the_view_is_not_folded_back_into_the
     }
     BOOST_TEST(folded == 0);
   }
+}
+
+BOOST_AUTO_TEST_CASE(a_distortion_that_folds_within_the_image_is_refused) {
+  DepthCamera camera = test::small_camera({1.0, 0.0, 1.0}, {0.0, 0.0, 0.0});
+  camera.distortion_model = DistortionModel::brown_conrady;
+  camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
+  // The corner is at 0.83 from the axis; r (1 - 0.3 r²) reaches 0.70.
+  BOOST_TEST(refusal_of(camera).find("no ray") != std::string::npos, refusal_of(camera));
+  camera.fx = camera.fy = 200.0;
+  BOOST_TEST(refusal_of(camera) == "none");
 }
 
 BOOST_AUTO_TEST_CASE(a_window_holds_all_rays_between_its_bounds) {

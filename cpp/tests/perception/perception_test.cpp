@@ -111,6 +111,7 @@ BOOST_FIXTURE_TEST_CASE(what_the_arm_hides_is_remembered, Watched) {
 }
 
 BOOST_FIXTURE_TEST_CASE(what_is_outside_of_the_view_of_a_distorting_lens_is_not_seen_free, Watched) {
+  camera.fx = camera.fy = 200.0;
   camera.distortion_model = DistortionModel::brown_conrady;
   camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
   settings.memory = 100.0;
