@@ -99,6 +99,19 @@ void check_numbers(const DepthCamera& c) {
   }
 }
 
+void check_corners(const DepthCamera& camera) {
+  for (const int u : {0, camera.width - 1}) {
+    for (const int v : {0, camera.height - 1}) {
+      const Eigen::Vector2d ray = camera.ray(u, v), back = camera.project({ray.x(), ray.y(), 1.0});
+      if (!((back - Eigen::Vector2d(u, v)).norm() < same_pixel)) {
+        refuse_camera(camera, "pixel (" + std::to_string(u) + ", " + std::to_string(v) +
+                                  ") has no ray: the distortion turns back within the image; allowed: coefficients that hold "
+                                  "in its corners");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 void DepthCamera::validate() const {
@@ -114,16 +127,8 @@ void DepthCamera::validate() const {
     refuse_camera(*this, "pose has numbers that are not finite");
   }
   check_rotation(pose.linear(), "camera '" + name + "'");
-  for (const double u : {0.0, width - 1.0}) {
-    for (const double v : {0.0, height - 1.0}) {
-      const Eigen::Vector2d at = ray(u, v), back = project({at.x(), at.y(), 1.0});
-      if (distortion_model == DistortionModel::brown_conrady && !((back - Eigen::Vector2d(u, v)).norm() < same_pixel)) {
-        refuse_camera(
-            *this,
-            "pixel (" + std::to_string(static_cast<int>(u)) + ", " + std::to_string(static_cast<int>(v)) +
-                ") has no ray: the distortion turns back within the image; allowed: coefficients that hold in its corners");
-      }
-    }
+  if (distortion_model == DistortionModel::brown_conrady) {
+    check_corners(*this);
   }
 }
 
