@@ -20,7 +20,7 @@ const std::vector<Field<PerceptionSettings>>& fields() {
       {"clear_after", &S::clear_after, "-", 1, 10,
        "number of images in a row that must see through a cell before what was there is gone: more is safer against flicker, and clears later"},
       {"least_pixels", &S::least_pixels, "-", 1, 100,
-       "number of pixels that must show a cell before it counts at once; with fewer it counts when a second image shows it, the next or the one after it: more makes fewer ghosts, and shows thin things later"},
+       "number of pixels that must show a cell before it counts at once, or three times as many around it where noise is larger than a cell; with fewer it counts when a second image shows it, the next or the one after it: more makes fewer ghosts, and shows thin things later"},
       {"steady_images", &S::steady_images, "-", 1, 100,
        "number of images over which a camera that stands still averages the depth of what rests (1: none): more is smoother, and up to 2 sigma behind what moves slowly (by less than 1 sigma from image to image), 0.9 sigma where it is 15 pixels wide and high"},
       {"unseen_is_free", &S::unseen_is_free, "-", 0, 1,

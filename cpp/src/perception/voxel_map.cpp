@@ -28,6 +28,11 @@ constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at
 constexpr double around = 0.35;           // so far from it, in sizes of the box.
 constexpr int samples_free = 3;           // of which so many must be free, and none hidden
 
+constexpr double spread = 2.0;          // Noise of depths over which a surface is spread along the ray, in standard deviations,
+constexpr double neighbourhood = 3.0;   // and width of what is looked at around a cell that it reaches [edges],
+constexpr double samples_across = 6.0;  // by so many pixels across, or somewhat more.
+constexpr double tail = 1.25;  // Mean distance of what is looked at from the cell, at most: 2 sigma off a surface [sigma].
+
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
 
 }  // namespace
@@ -166,14 +171,49 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   const double distance = (voxel.low_corner() - seen.X_WC.translation()).norm();
   const double pixel = distance / std::min(seen.camera.fx, seen.camera.fy);
   const double all_pixels = std::pow(edge(voxel) / pixel, 2);  // that a surface across the cell takes, at most
-  voxel.counts =
-      voxel.counts || voxel.pixels >= std::max<double>(settings_.least_pixels, least_share * all_pixels) || shown_again;
+  voxel.counts = voxel.counts || voxel.pixels >= std::max<double>(settings_.least_pixels, least_share * all_pixels) ||
+                 shown_again || is_seen_around(voxel, seen);
   voxel.shown_by |= bit(seen.number);
   voxel.error = static_cast<float>(seen.camera.translation_error + seen.camera.rotation_error * distance);
   voxel.last = std::max(voxel.last, seen.time);
   voxel.free_images = voxel.missed_images = voxel.gap = 0;
   voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
+}
+
+bool VoxelMap::is_seen_around(const Voxel& voxel, const SeenImage& seen) const noexcept {
+  const DepthCamera& camera = seen.camera;
+  const Eigen::Vector3d middle = seen.X_WC.inverse() * voxel.frame_middle();
+  const double edge = this->edge(voxel), noise = camera.noise.sigma(middle.z());
+  if (!(middle.z() >= camera.near) || noise < edge) {
+    return false;
+  }
+  const Eigen::Vector2d pixel = camera.project(middle);
+  if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() <= camera.width - 1.0 && pixel.y() <= camera.height - 1.0)) {
+    return false;  // also where a lens folds
+  }
+  const double half_u = 0.5 * neighbourhood * edge * camera.fx / middle.z(), half_v = half_u * camera.fy / camera.fx;
+  const int u0 = static_cast<int>(std::max(0.0, std::ceil(pixel.x() - half_u))),
+            v0 = static_cast<int>(std::max(0.0, std::ceil(pixel.y() - half_v))),
+            u1 = static_cast<int>(std::min(camera.width - 1.0, pixel.x() + half_u)),
+            v1 = static_cast<int>(std::min(camera.height - 1.0, pixel.y() + half_v));
+  const int step = std::max(1, static_cast<int>(2.0 * half_u / samples_across));
+  const double all_pixels = (u1 - u0 + 1.0) * (v1 - v0 + 1.0);
+  const double least = std::max(neighbourhood * settings_.least_pixels, least_share * all_pixels) / (step * step);
+  int num = 0;
+  double sum = 0.0;  // of the distances behind the cell [m]
+  for (int v = v0; v <= v1; v += step) {
+    const std::size_t row = static_cast<std::size_t>(v) * static_cast<std::size_t>(camera.width);
+    for (int u = u0; u <= u1; u += step) {
+      const std::size_t i = row + static_cast<std::size_t>(u);
+      const double behind = seen.depth[i] - middle.z();
+      if (seen.image.labels()[i] == PixelLabel::obstacle && std::abs(behind) <= spread * noise) {
+        sum += behind;
+        ++num;
+      }
+    }
+  }
+  return num >= least && std::abs(sum) <= tail * num * noise;  // else it is in the tail of the noise of another surface
 }
 
 void VoxelMap::take_box(Voxel& voxel, double time) const noexcept {

@@ -207,6 +207,48 @@ BOOST_FIXTURE_TEST_CASE(what_moves_has_its_velocity, Watched) {
              0.2);  // cells of 2 cm stand still, images 12 cm apart are compared
 }
 
+BOOST_FIXTURE_TEST_CASE(few_pixels_far_away_count_at_once, Watched) {
+  constexpr double noise = 0.05, period = 0.1, speed = 0.5;  // [m], [s], [m/s]
+  camera.noise = {noise, 0.0};
+  start();
+  step();
+  std::mt19937 random(1);
+  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
+  const auto see = [&](const Eigen::Vector3d& centre) {
+    scene = {};
+    scene.floor = -10.0;
+    scene.add_sphere(centre, 0.07);  // some 40 pixels, whose noise spreads them over 100 cells
+    scene.add_arm(arm.robot(), arm.body(), q);
+    std::vector<float> pixels = scene.image(camera);
+    for (float& depth : pixels) {
+      depth += depth > 0.0f ? error(random) : 0.0f;
+    }
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    time += period;
+    step();
+  };
+  for (int n = 0; n < 5; ++n) {
+    see({0.0, 0.0, -100.0});
+  }
+  Eigen::Vector3d centre;
+  for (int n = 0; n < 5; ++n) {
+    centre = {-0.1, 0.9 - speed * period * n, 0.5};
+    see(centre);
+    const auto num = points("front", centre, 0.07 + 3.0 * noise);
+    BOOST_TEST_INFO("image " << n);
+    BOOST_TEST(num >= 12);  // 9 and fewer as long as each cell had to show three pixels
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int num = 0;
+  for (const Perception::Cell& cell : perception->cells()) {
+    if ((cell.centre - centre).norm() < 0.07 + 3.0 * noise && cell.age == 0.0) {
+      sum += cell.velocity;
+      ++num;
+    }
+  }
+  BOOST_TEST((sum / num - Eigen::Vector3d(0.0, -speed, 0.0)).norm() < 0.15);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
   constexpr double noise = 0.02, period = 0.1;  // [m], [s]
   camera.fx = camera.fy = 200.0;

@@ -107,6 +107,8 @@ class VoxelMap {
   Voxel& voxel_at(int cell, double time);
   void begin_frame(Voxel& voxel, const SeenImage& seen) noexcept;
   void end_frame(Voxel& voxel, const SeenImage& seen) noexcept;
+  /// Whether the image shows a surface around a cell that noise spreads over more cells than one along the ray.
+  bool is_seen_around(const Voxel& voxel, const SeenImage& seen) const noexcept;
   /// What an image says of a cell that it did not show; `surface`: its depth is that of the cell, but for noise.
   enum class Sight { elsewhere, hidden, surface, free };
   Sight sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
