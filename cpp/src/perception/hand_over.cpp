@@ -20,6 +20,7 @@ constexpr double beside = 0.1;           // so near to the box of what moves [m]
 constexpr int few_cells = 3;             // Number of cells that can be noise,
 constexpr double small_cell = 0.05;      // of that edge at most [m],
 constexpr double sure_age = 0.13;        // and time for which they must move away from what rests to be none [s].
+constexpr double unsure_speed = 0.5;     // Uncertainty of what appears apart from what rests, at most [m/s].
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 /// Adds a cell that moves to what has its velocity.
@@ -182,12 +183,16 @@ void Perception::Impl::find_velocities(View& view, double time) {
   }
   drop_noise(view.movers);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
+    const int index = fresh[static_cast<std::size_t>(n)];
+    const auto at = static_cast<std::size_t>(index);
     const auto is_of = [&](const Mover& mover) { return mover.velocity == found.velocities.col(n); };
     if (std::any_of(view.movers.begin(), view.movers.end(), is_of)) {
-      const int index = fresh[static_cast<std::size_t>(n)];
-      velocities[static_cast<std::size_t>(index)] = found.velocities.col(n).cast<float>();
-      uncertainties[static_cast<std::size_t>(index)] = static_cast<float>(found.uncertainty[n]);
+      velocities[at] = found.velocities.col(n).cast<float>();
+      uncertainties[at] = static_cast<float>(found.uncertainty[n]);
       map.set_moves(index, true);
+    } else if (view.stands_still && !map.is_beside_rest(map.voxels()[at])) {
+      // A velocity that is not believed is not known to be zero either.
+      uncertainties[at] = static_cast<float>(std::min(unsure_speed, found.uncertainty[n] + found.velocities.col(n).norm()));
     }
   }
 }
@@ -235,7 +240,9 @@ Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
       speeds.col(n) = as[k]->velocity;
     }
   }
-  return all.size() > 0 && !speeds.isZero(0.0) ? all.moving(std::move(speeds), std::move(uncertainty)) : all;
+  return all.size() > 0 && !(speeds.isZero(0.0) && uncertainty.isZero(0.0))
+             ? all.moving(std::move(speeds), std::move(uncertainty))
+             : all;
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {

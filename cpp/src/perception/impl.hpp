@@ -49,6 +49,7 @@ struct Perception::Impl {
     double through = 0.0;                                      // share of rays that see through the arm, smoothed
     VelocityEstimate motion;                                   // of what the camera shows
     std::vector<Mover> movers;                                 // in its last image
+    bool stands_still = true;                                  // The camera, at its last image.
   };
   struct Region {
     std::string name;

@@ -112,8 +112,8 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
     report.question = "camera '" + view.camera.name + (is_blind ? sees_nothing : sees_through_arm);
     return report;
   }
-  const bool stands_still = view.camera.link.empty() && !capture.pose;
-  if (stands_still && settings.steady_images > 1) {
+  view.stands_still = view.camera.link.empty() && !capture.pose;
+  if (view.stands_still && settings.steady_images > 1) {
     view.steady.add(view.camera, view.image);
     view.depth = view.steady.depth();
   } else {

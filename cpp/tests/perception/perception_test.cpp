@@ -249,6 +249,40 @@ BOOST_FIXTURE_TEST_CASE(few_pixels_far_away_count_at_once, Watched) {
   BOOST_TEST((sum / num - Eigen::Vector3d(0.0, -speed, 0.0)).norm() < 0.15);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_appears_apart_from_what_rests_may_move, Watched) {
+  camera.fx = camera.fy = 200.0;
+  const Eigen::Vector3d place(0.3, 0.5, 0.6);
+  step();
+  for (const bool stands_still : {true, false}) {
+    scene.balls.resize(1);
+    scene.add_arm(arm.robot(), arm.body(), q);
+    start();
+    const auto see = [&](int images) {
+      for (int n = 0; n < images; ++n, time += 0.03) {
+        step();
+        const auto pose = stands_still ? std::nullopt : std::optional<Eigen::Isometry3d>(camera.pose);
+        BOOST_TEST(look(Capture{time, {}, pose}).used);
+      }
+    };
+    const auto largest = [&] {
+      const auto set = said("front");
+      double found = -1.0;
+      for (Eigen::Index n = 0; n < set->size(); ++n) {
+        found = (set->points().col(n) - place).norm() < 0.12 ? std::max(found, set->uncertainty()[n]) : found;
+      }
+      return found;
+    };
+    see(45);
+    BOOST_TEST(said("front")->uncertainty().isZero(0.0));
+    scene.add_sphere(place, 0.1);
+    see(1);
+    BOOST_TEST(largest() == (stands_still ? 0.5 : 0.0));  // to a camera that moves something always comes into view
+    BOOST_TEST(said("front")->velocities().isZero(0.0));
+    see(45);
+    BOOST_TEST(largest() == 0.0);
+  }
+}
+
 BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
   constexpr double noise = 0.02, period = 0.1;  // [m], [s]
   camera.fx = camera.fy = 200.0;
