@@ -6,9 +6,14 @@
 #include "real_time_thread.hpp"
 
 namespace sidestep {
+namespace {
+
+constexpr double longest_pause = 0.1, longest_periods = 5.0;  // Time for which it holds a command [s], [periods]; as of Clock.
+
+}  // namespace
 
 IdealDriver::IdealDriver(const Arm& arm, const Eigen::VectorXd& q, double period, bool real_time, const Eigen::VectorXd& v)
-    : state_(arm.num_coordinates()) {
+    : state_(arm.num_coordinates()), acceleration_(Eigen::VectorXd::Zero(arm.num_coordinates())) {
   using Output = ControllerSettings::Output;
   description_.name = "ideal " + arm.name();
   description_.joints = arm.robot().coordinate_names();
@@ -30,13 +35,18 @@ IdealDriver::IdealDriver(const Arm& arm, const Eigen::VectorXd& q, double period
   state_.q = q;
   state_.v = v.size() == 0 ? Eigen::VectorXd(Eigen::VectorXd::Zero(q.size())) : v;
   state_.time = real_time ? monotonic_time() : 0.0;
-  elapsed_ = period;
 }
 
 DriverResult IdealDriver::read(RobotState& state, double) noexcept {
-  const double before = state_.time;
-  state_.time = description_.real_time ? monotonic_time() : before + description_.period;
-  elapsed_ = description_.real_time ? std::max(description_.period, state_.time - before) : description_.period;
+  const double before = state_.time, period = description_.period;
+  state_.time = description_.real_time ? monotonic_time() : before + period;
+  if (has_command_ && output_ != ControllerSettings::Output::position) {
+    const double passed = description_.real_time ? std::max(period, state_.time - before) : period;
+    const double held = passed > std::max(longest_pause, longest_periods * period) ? period : passed;
+    state_.v += held * acceleration_;
+    state_.q += held * state_.v;
+  }
+  has_command_ = false;
   state = state_;
   return DriverResult::ok;
 }
@@ -45,15 +55,13 @@ DriverResult IdealDriver::write(const Command& command) noexcept {
   using Output = ControllerSettings::Output;
   if (output_ == Output::position) {
     state_.q = command.position;
-    state_.v = command.velocity;
-    return DriverResult::ok;
   }
-  if (output_ == Output::velocity) {
+  if (output_ == Output::position || output_ == Output::velocity) {
     state_.v = command.velocity;
   } else {
-    state_.v += elapsed_ * command.acceleration;
+    acceleration_ = command.acceleration;
   }
-  state_.q += elapsed_ * state_.v;
+  has_command_ = true;
   return DriverResult::ok;
 }
 

@@ -8,9 +8,10 @@
 
 namespace sidestep {
 
-/// An ideal robot: it tracks every command exactly. With torque or acceleration v ← v + a T, q ← q + v T; with velocity or position it is
-/// where the reference is, at its speed. T is the time between the last two reads, at least a period: its clock is the machine's, or its own, which goes on
-/// by a period with each read.
+/// An ideal robot: it tracks every command exactly, and holds it until the next read. With torque or acceleration v ← v + a T,
+/// q ← q + v T; with velocity q ← q + v T; with position it is where the reference is, at its speed. T is the time since the read before,
+/// at least a period: its clock is the machine's, or its own, which goes on by a period with each read. After 0.1 s, or five periods where
+/// they are longer, nobody leads it any more: it has stayed where it was after one period, as the controller takes it for.
 class IdealDriver final : public Driver {
  public:
   /// Starts at q (nv) with velocity v (nv); empty: at rest. Throws std::invalid_argument on a wrong size or what is not finite, or a
@@ -19,17 +20,24 @@ class IdealDriver final : public Driver {
               const Eigen::VectorXd& v = {});
 
   const RobotDescription& description() const noexcept override { return description_; }
-  void start(ControllerSettings::Output output) override { output_ = output; }
+  void start(ControllerSettings::Output output) override {
+    output_ = output;
+    has_command_ = false;
+  }
   DriverResult read(RobotState& state, double timeout) noexcept override;
   DriverResult write(const Command& command) noexcept override;
-  void stop() noexcept override { state_.v.setZero(); }
+  void stop() noexcept override {
+    state_.v.setZero();
+    has_command_ = false;
+  }
   std::string trouble() const override { return {}; }
 
  private:
   RobotDescription description_;
   ControllerSettings::Output output_ = ControllerSettings::Output::acceleration;
   RobotState state_;
-  double elapsed_;  // between the last two reads [s]
+  Eigen::VectorXd acceleration_;  // of the last command
+  bool has_command_ = false;      // since the last read
 };
 
 }  // namespace sidestep
