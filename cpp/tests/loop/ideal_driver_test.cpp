@@ -38,6 +38,21 @@ BOOST_AUTO_TEST_CASE(a_command_is_held_until_the_robot_is_read_again) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(a_robot_that_takes_velocities_does_not_go_on_with_an_acceleration_before) {
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  IdealDriver robot(arm, Eigen::VectorXd::Zero(nv), 0.001, false);
+  RobotState state(nv);
+  Command command(nv);
+  command.velocity.setConstant(0.5);
+  command.acceleration.setConstant(10.0);
+  for (const Output output : {Output::acceleration, Output::velocity}) {
+    robot.start(output);
+    robot.write(command);
+    robot.read(state, 0.0);
+  }
+  BOOST_TEST(state.v[0] == 0.5);
+}
+
 BOOST_AUTO_TEST_CASE(a_robot_that_nobody_leads_stays_where_it_is) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   IdealDriver robot(arm, Eigen::VectorXd::Zero(nv));

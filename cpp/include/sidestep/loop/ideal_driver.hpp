@@ -10,8 +10,8 @@ namespace sidestep {
 
 /// An ideal robot: it tracks every command exactly, and holds it until the next read. With torque or acceleration v ← v + a T,
 /// q ← q + v T; with velocity q ← q + v T; with position it is where the reference is, at its speed. T is the time since the read before,
-/// at least a period: its clock is the machine's, or its own, which goes on by a period with each read. After 0.1 s, or five periods where
-/// they are longer, nobody leads it any more: it has stayed where it was after one period, as the controller takes it for.
+/// at least a period: its clock is the machine's, or its own, which goes on by a period with each read. A longer T than
+/// 0.1 s and five periods counts as one period, as for the controller: nobody led the robot, and it stayed.
 class IdealDriver final : public Driver {
  public:
   /// Starts at q (nv) with velocity v (nv); empty: at rest. Throws std::invalid_argument on a wrong size or what is not finite, or a
@@ -22,6 +22,7 @@ class IdealDriver final : public Driver {
   const RobotDescription& description() const noexcept override { return description_; }
   void start(ControllerSettings::Output output) override {
     output_ = output;
+    acceleration_.setZero();
     has_command_ = false;
   }
   DriverResult read(RobotState& state, double timeout) noexcept override;
