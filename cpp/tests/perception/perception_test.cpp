@@ -27,6 +27,8 @@ struct Watched {
   std::unique_ptr<Perception> perception;
   test::DepthScene scene;
   double time = 10.0;
+  std::mt19937 random{1};
+  std::normal_distribution<float> error;
 
   Watched() {
     camera.translation_error = 0.01;
@@ -46,6 +48,14 @@ struct Watched {
     time += 0.03;
     step();
     return report;
+  }
+  /// An image with the constant noise of the camera; no time passes.
+  void look_with_noise() {
+    std::vector<float> pixels = scene.image(camera);
+    for (float& depth : pixels) {
+      depth += depth > 0.0f ? static_cast<float>(camera.noise.constant) * error(random) : 0.0f;
+    }
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
   }
   /// What a source said last; null: nothing.
   std::shared_ptr<const Obstacles> said(const std::string& source) const {
@@ -212,18 +222,12 @@ BOOST_FIXTURE_TEST_CASE(few_pixels_far_away_count_at_once, Watched) {
   camera.noise = {noise, 0.0};
   start();
   step();
-  std::mt19937 random(1);
-  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
   const auto see = [&](const Eigen::Vector3d& centre) {
     scene = {};
     scene.floor = -10.0;
     scene.add_sphere(centre, 0.07);  // some 40 pixels, whose noise spreads them over 100 cells
     scene.add_arm(arm.robot(), arm.body(), q);
-    std::vector<float> pixels = scene.image(camera);
-    for (float& depth : pixels) {
-      depth += depth > 0.0f ? error(random) : 0.0f;
-    }
-    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    look_with_noise();
     time += period;
     step();
   };
@@ -289,17 +293,11 @@ BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
   camera.noise = {noise, 0.0};
   start();
   step();
-  std::mt19937 random(1);
-  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
   scene.floor = -10.0;
   Eigen::Vector3d& centre = scene.balls.front().centre;
   for (int n = 0; n < 11; ++n) {  // in the end the border of the image is at the ball's middle
     centre.y() = 0.25 + 0.5 * period * n;
-    std::vector<float> pixels = scene.image(camera);
-    for (float& depth : pixels) {
-      depth += depth > 0.0f ? error(random) : 0.0f;
-    }
-    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    look_with_noise();
     time += period;
     step();
   }
@@ -320,8 +318,6 @@ BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_hardly_ever_moves, Watched) {
   camera.fx = camera.fy = 200.0;
   camera.noise = {noise, 0.0};
   start();
-  std::mt19937 random(1);
-  std::normal_distribution<float> error(0.0f, static_cast<float>(noise));
   int moving = 0, seen = 0;
   for (int n = 0; n < 60; ++n) {
     q = Eigen::Vector4d(-0.8 + 0.03 * n, -0.8, 0.5, 1.1);  // 1 rad/s
@@ -329,11 +325,7 @@ BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_hardly_ever_moves, Watched) {
     scene = {};
     scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);
     scene.add_arm(arm.robot(), arm.body(), q);
-    std::vector<float> pixels = scene.image(camera);
-    for (float& depth : pixels) {
-      depth += depth > 0.0f ? error(random) : 0.0f;
-    }
-    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    look_with_noise();
     time += 0.03;
     for (const Perception::Cell& cell : perception->cells()) {
       seen += cell.age > 0.0 ? 0 : 1;
