@@ -62,7 +62,7 @@ def test_the_arm_goes_by_what_a_camera_sees(studio: Studio, looker: Looker) -> N
     assert sight is not None
     view = studio.view.sight
     assert view.counts["seen"] + view.counts["hidden"] + view.counts["remembered"] == len(sight.kinds)
-    assert count_of(looker, "seen") == str(view.counts["seen"])
+    until(lambda: count_of(looker, "seen") == str(view.counts["seen"]), "the count, on the page")
     assert view.counts["seen"] > 20
     assert count_of(looker, "arm") == f"{100 * sight.pixels['arm']:.1f} %"
     shown = looker.page.locator("#camera").locator("xpath=preceding::img[1]")

@@ -2,6 +2,7 @@
 
 import os
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,6 +32,25 @@ def test_it_listens_on_this_machine_only() -> None:
     box = Box(Arm.load("ur5"), np.zeros(6), period=0.008, unlock_after=5.0, log=print)
     with pytest.raises(ValueError, match=r"addresses of this machine only \(127.x.x.x\), not at 0.0.0.0"):
         Server(box, address="0.0.0.0", model="UR5", version=(3, 15, 8, 0))
+
+
+def test_a_box_that_is_behind_its_time_hears() -> None:
+    address = ADDRESS.rpartition(".")[0] + ".254"
+    box = Box(Arm.load("ur5"), np.zeros(6), period=0.002, unlock_after=5.0, log=print)
+    reader, writer = os.pipe()  # the end of what is watched
+    slow = {"address": address, "on_tick": lambda: time.sleep(2.0 * box.period)}
+    with Server(box, model="UR5", version=(5, 12, 0, 0), **slow) as server:  # type: ignore[arg-type]
+        server.watched[reader] = lambda: False
+        thread = threading.Thread(target=server.serve, daemon=True)
+        thread.start()
+        with socket.create_connection((address, DASHBOARD), timeout=10.0) as client:
+            assert client.recv(100) == b"Connected: Universal Robots Dashboard Server\n"
+        os.write(writer, b"x")
+        thread.join(10.0)
+        assert not thread.is_alive()
+    assert box.time > 0.0
+    for end in (reader, writer):
+        os.close(end)
 
 
 def test_the_dashboard_greets_and_answers_lines(robot: StandInProcess) -> None:

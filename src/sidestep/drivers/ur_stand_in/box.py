@@ -157,29 +157,29 @@ class Box:
         Args:
             name: as in RTDE's guide.
         """
-        joints = self.joints
         if name in self.registers.values:
             return self.registers.values[name]
-        if name == "actual_TCP_pose":
-            return tip_pose(self.arm, joints.position)
-        known = {
-            "timestamp": self.time,
-            "actual_q": joints.position,
-            "actual_qd": joints.velocity,
-            "target_q": joints.target,
-            "target_qd": joints.target_velocity,
-            "target_qdd": joints.target_acceleration,
-            "target_moment": joints.torque,
-            "actual_current": joints.torque / TORQUE_CONSTANT,
-            "target_current": joints.torque / TORQUE_CONSTANT,
-            "robot_mode": self.mode,
-            "joint_mode": (JOINT_RUNNING if self.mode == RUNNING else JOINT_IDLE,) * 6,
-            "safety_mode": self.safety,
-            "safety_status": self.safety,
-            "safety_status_bits": SAFETY_BITS[self.safety],
-            "robot_status_bits": int(self.mode == RUNNING) | self.playing << 1 | self.freedrive << 2,
-            "runtime_state": PLAYING if self.playing else STOPPED,
-            "speed_scaling": 1.0,
-            "target_speed_fraction": 1.0,
-        }
-        return known.get(name, 0)
+        return KNOWN[name](self) if name in KNOWN else 0
+
+
+KNOWN: dict[str, Callable[[Box], Any]] = {  # by their names in RTDE's guide
+    "timestamp": lambda box: box.time,
+    "actual_q": lambda box: box.joints.position,
+    "actual_qd": lambda box: box.joints.velocity,
+    "target_q": lambda box: box.joints.target,
+    "target_qd": lambda box: box.joints.target_velocity,
+    "target_qdd": lambda box: box.joints.target_acceleration,
+    "target_moment": lambda box: box.joints.torque,
+    "actual_current": lambda box: box.joints.torque / TORQUE_CONSTANT,
+    "target_current": lambda box: box.joints.torque / TORQUE_CONSTANT,
+    "actual_TCP_pose": lambda box: tip_pose(box.arm, box.joints.position),
+    "robot_mode": lambda box: box.mode,
+    "joint_mode": lambda box: (JOINT_RUNNING if box.mode == RUNNING else JOINT_IDLE,) * 6,
+    "safety_mode": lambda box: box.safety,
+    "safety_status": lambda box: box.safety,
+    "safety_status_bits": lambda box: SAFETY_BITS[box.safety],
+    "robot_status_bits": lambda box: int(box.mode == RUNNING) | box.playing << 1 | box.freedrive << 2,
+    "runtime_state": lambda box: PLAYING if box.playing else STOPPED,
+    "speed_scaling": lambda box: 1.0,
+    "target_speed_fraction": lambda box: 1.0,
+}

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import struct
 
-import numpy as np
-
 from sidestep.drivers.ur_stand_in.box import Box
 
 HEADER = struct.Struct(">HB")  # size with header, type
@@ -58,7 +56,7 @@ class RtdeClient:
         self._box, self._controller = box, controller
         self._received = bytearray()
         self._inputs: list[list[str]] = []
-        self._outputs: list[str] = []
+        self._outputs: dict[str, int] = {}  # how many numbers each has
         self._layout = struct.Struct(">B")
         self._every, self._count, self._started = 1, 0, False
 
@@ -92,12 +90,9 @@ class RtdeClient:
         if self._count % self._every:
             return b""
         values: list[float] = []
-        for name in self._outputs:
+        for name, size in self._outputs.items():
             value = self._box.value(name)
-            size = struct.calcsize(">" + FORMATS[_type(name)]) // struct.calcsize(
-                ">" + FORMATS[_type(name)][-1]
-            )
-            values += [value] if size == 1 else list(np.broadcast_to(np.asarray(value), (size,)))
+            values.extend((value,) * size if isinstance(value, (int, float)) else value)
         return _package(DATA, self._layout.pack(1, *values))
 
     def _answer(self, kind: int, payload: bytes) -> bytes:
@@ -107,8 +102,9 @@ class RtdeClient:
             return struct.pack(">4I", *self._controller)
         if kind == OUTPUTS:
             (frequency,) = struct.unpack_from(">d", payload)
-            self._outputs = _names(payload[8:])
-            self._layout = struct.Struct(">B" + "".join(FORMATS[_type(name)] for name in self._outputs))
+            formats = {name: FORMATS[_type(name)] for name in _names(payload[8:])}
+            self._outputs = {name: int(format[:-1] or 1) for name, format in formats.items()}
+            self._layout = struct.Struct(">B" + "".join(formats.values()))
             self._every = max(1, round(1.0 / (frequency * self._box.period)))
             return b"\x01" + ",".join(map(_type, self._outputs)).encode()
         if kind == INPUTS:

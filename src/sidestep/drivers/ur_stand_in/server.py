@@ -117,6 +117,8 @@ class Server:
     def serve(self) -> None:
         """Serves and steps until one of `watched` returns false.
 
+        A box that is behind its time takes one step after another, and serves between two: it hears all the same.
+
         `watched`: file descriptors, and what is called where one can be read.
         """
         self._next = time.monotonic() + self.box.period
@@ -134,7 +136,7 @@ class Server:
                     self._accept(source)
                 else:
                     self._receive(source)
-            while time.monotonic() >= self._next:
+            if time.monotonic() >= self._next:
                 self._next += self.box.period
                 self._tick()
 
