@@ -37,7 +37,7 @@ void bind_sources(nb::module_& m) {
   nb::class_<SourceState>(m, "SourceState", "What a controller believes of a source of obstacles.")
       .def_ro("name", &SourceState::name, "As `set_obstacles` was told.")
       .def_ro("size", &SourceState::size, "Number of points.")
-      .def_ro("age", &SourceState::age, "Time since what is believed was captured [s].")
+      .def_ro("age", &SourceState::age, "Time since what is believed was captured [s]; inf: it was expected, and has not come yet.")
       .def_ro("valid_for", &SourceState::valid_for, "Age up to which it is believed [s]; inf: for ever.")
       .def_ro("is_overdue", &SourceState::is_overdue, "It is older than that: the arm stops until it comes again.")
       .def_ro("is_emptied", &SourceState::is_emptied, "Newer sets are empty, and not believed yet.")
@@ -69,9 +69,14 @@ void bind_sources(nb::module_& m) {
        "has stayed empty for `sources.empty_after`; `remove_obstacles` at once. Until anything was set the arm stays where it is:\n"
        "`Obstacles.none()` says that the space is free. Raises ValueError that names the value and what is allowed.")
       .def(
+          "expect_obstacles", [](Controller& self, nb::handle source) { self.expect_obstacles(as_text(source, "source", "the name of a source")); },
+          nb::arg("source"), nb::sig("def expect_obstacles(self, source: str) -> None"),
+          "Tells that a source will come: the arm stays where it is until it has said something, as a second camera that starts later. A\n"
+          "source that has, stays as it is. `Perception` expects each of its cameras. Raises ValueError that names the value.")
+      .def(
           "remove_obstacles", [](Controller& self, nb::handle source) { self.remove_obstacles(as_text(source, "source", "the name of a source")); },
           nb::arg("source") = SourceOptions::scene, nb::sig("def remove_obstacles(self, source: str = 'scene') -> None"),
-          "Forgets a source, at once. Raises ValueError that lists the sources.")
+          "Forgets a source, at once; also one that was expected. Raises ValueError that lists the sources.")
       .def(
           "add_obstacle",
           [](Controller& self, nb::handle obstacle, nb::handle source) {

@@ -3663,8 +3663,16 @@ class Controller:
         `Obstacles.none()` says that the space is free. Raises ValueError that names the value and what is allowed.
         """
 
+    def expect_obstacles(self, source: str) -> None:
+        """
+        Tells that a source will come: the arm stays where it is until it has said something, as a second camera that starts later. A
+        source that has, stays as it is. `Perception` expects each of its cameras. Raises ValueError that names the value.
+        """
+
     def remove_obstacles(self, source: str = 'scene') -> None:
-        """Forgets a source, at once. Raises ValueError that lists the sources."""
+        """
+        Forgets a source, at once; also one that was expected. Raises ValueError that lists the sources.
+        """
 
     def add_obstacle(self, obstacle: Obstacles | sidestep.obstacles.Shape, source: str = 'scene') -> None:
         """
@@ -3927,7 +3935,9 @@ class SourceState:
 
     @property
     def age(self) -> float:
-        """Time since what is believed was captured [s]."""
+        """
+        Time since what is believed was captured [s]; inf: it was expected, and has not come yet.
+        """
 
     @property
     def valid_for(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,6 +58,32 @@ def test_a_source_that_falls_silent_stops_the_arm_and_the_next_set_lets_it_go_on
     assert np.abs(motion.last_v).max() < 0.01
     controller.set_obstacles(ss.Obstacles(FAR), source="camera", time=controller.time)
     assert controller.step(motion.last_q, motion.last_v).activity == ss.Activity.moving
+
+
+def test_the_arm_waits_for_a_source_that_is_expected(planar: ss.Arm, tmp_path: Path) -> None:
+    controller = controller_of(planar)
+    with controller.record(tmp_path / "run.mcap"):
+        controller.set_obstacles(ss.Obstacles.none())
+        controller.expect_obstacles("side")
+        motion = ss.integrate(controller, START, np.zeros(3), steps=100)
+        np.testing.assert_array_equal(motion.last_q, START)
+        assert controller.explain() == (
+            "stopped: source 'side' was expected and has not come yet; the arm goes on when it does"
+        )
+        assert [(s.name, s.age, s.is_overdue) for s in controller.sources] == [
+            ("scene", pytest.approx(0.099), False),
+            ("side", np.inf, True),
+        ]
+        controller.set_obstacles(ss.Obstacles(FAR), source="side", time=controller.time)
+        controller.expect_obstacles("side")  # it is there
+        assert controller.step(START, np.zeros(3)).activity == ss.Activity.moving
+        controller.expect_obstacles("back")
+        assert controller.step(START, np.zeros(3)).activity == ss.Activity.stale
+        controller.remove_obstacles("back")
+        assert controller.step(START, np.zeros(3)).activity == ss.Activity.moving
+    assert ss.replay(tmp_path / "run.mcap").equal
+    with pytest.raises(ValueError, match="the source's name is ''"):
+        controller.expect_obstacles("")
 
 
 def test_what_rests_in_the_scene_is_believed_for_ever(planar: ss.Arm) -> None:

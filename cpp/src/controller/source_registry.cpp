@@ -120,7 +120,9 @@ SourceRegistry::Entry* SourceRegistry::find(const std::string& source) noexcept 
 std::vector<SourceContent> SourceRegistry::said() const {
   std::vector<SourceContent> all;
   for (const Entry& entry : entries_) {
-    all.push_back({entry.set.name, entry.set.time, entry.set.points});
+    if (entry.set.time != SourceSet::not_come) {
+      all.push_back({entry.set.name, entry.set.time, entry.set.points});
+    }
   }
   return all;
 }
@@ -198,6 +200,16 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
   }
   entry.set.heard = options.time;
   entry.set.heard_number = ++number_;
+}
+
+void SourceRegistry::expect(const std::string& source) {
+  check({.source = source});
+  if (find(source) == nullptr) {
+    Entry& entry = at_or_new(source);
+    entry.set.time = entry.set.heard = SourceSet::not_come;
+    entry.set.valid_for = settings_.sources.valid_for;
+    entry.set.number = entry.set.heard_number = ++number_;
+  }
 }
 
 void SourceRegistry::find_velocities(Entry& entry, const Obstacles& before, double last, double time, bool has_time) const {

@@ -24,6 +24,8 @@ class SourceRegistry {
 
   /// Replaces what a source said. An empty set after one with points is not believed at once, see SourceSettings::empty_after.
   void set(Obstacles obstacles, const SourceOptions& options, double now);
+  /// Tells that a source will come: it is overdue until it is set. One that is there stays as it is.
+  void expect(const std::string& source);
   /// Forgets a source.
   void remove(const std::string& source);
   /// Adds named groups that a source does not have, or that are its first.

@@ -132,7 +132,7 @@ void Sources::judge_ages() noexcept {
       most = beyond;
       overdue_ = static_cast<int>(k);
     }
-    if (!motion_.parts[k].hidden) {
+    if (!motion_.parts[k].hidden && world.sources[k].points->size() > 0) {
       parts[k] = {settings_.sources.largest_speed * std::max(0.0, late), age(k) - std::max(0.0, late)};
       any = any || late > 0.0 || known_[k].uncertain;
     }
@@ -182,6 +182,9 @@ std::string Sources::explain() const {
   const auto k = static_cast<std::size_t>(overdue_);
   const SourceSet& set = buffer_.current().sources[k];
   const std::string who = "source '" + set.name + "' ";
+  if (set.time == SourceSet::not_come) {
+    return who + "was expected and has not come yet; the arm goes on when it does";
+  }
   if (known_[k].ahead > most_ahead) {
     return who + "was captured " + seconds(known_[k].ahead) + " after now: its clock is not that of step";
   }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ inline constexpr std::size_t most_sources = 32;
 
 /// The newest set of a source, as it was given.
 struct SourceSet {
+  static constexpr double not_come = -std::numeric_limits<double>::infinity();  // `time` of a source that is expected
+
   std::string name;
   std::uint64_t id = 0, number = 0;  // id: of the source until it is removed; number: of the set that the points are of
   double time = 0.0;                 // when it was captured, on the caller's clock [s]; NaN: when a step takes it

@@ -21,6 +21,7 @@ constexpr int few_cells = 3;             // Number of cells that can be noise,
 constexpr double small_cell = 0.05;      // of that edge at most [m],
 constexpr double sure_age = 0.13;        // and time for which they must move away from what rests to be none [s].
 constexpr double unsure_speed = 0.5;     // Uncertainty of what appears apart from what rests, at most [m/s].
+constexpr double moves_unseen = 0.4;     // Time for which what moved or may move goes on where no image shows it [s].
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 /// Adds a cell that moves to what has its velocity.
@@ -134,18 +135,15 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
     return Obstacles::none();
   }
   const auto num = static_cast<Eigen::Index>(chosen.size());
-  Eigen::Matrix3Xd points(3, num), speeds = Eigen::Matrix3Xd::Zero(3, num);
+  Eigen::Matrix3Xd points(3, num);
   Eigen::VectorXd radii(num);
   for (Eigen::Index n = 0; n < num; ++n) {
     const auto index = static_cast<std::size_t>(chosen[static_cast<std::size_t>(n)]);
     const CellBall ball = ball_of(map.voxels()[index], moved);
     points.col(n) = ball.centre;
     radii[n] = ball.radius;
-    if (moved) {
-      speeds.col(n) = velocities[index].cast<double>();
-    }
   }
-  return Obstacles(std::move(points), std::move(radii), std::move(speeds));
+  return Obstacles(std::move(points), std::move(radii), Eigen::Matrix3Xd::Zero(3, num));
 }
 
 void Perception::Impl::find_velocities(View& view, double time) {
@@ -159,8 +157,10 @@ void Perception::Impl::find_velocities(View& view, double time) {
     uncertainties[n] = 0.0f;
     map.set_moves(index, false);
     const Voxel& voxel = map.voxels()[n];
-    // What the first image shows may rest; what moves comes to other cells.
-    if (voxel.first > view.begin && !map.is_settled(voxel, view.X_WC.translation(), view.camera.noise)) {
+    // What the first image shows may rest, and is known to once others have shown it; what moves comes to other cells.
+    if (voxel.first <= view.begin) {
+      uncertainties[n] = view.stands_still && VoxelMap::may_move(voxel) ? static_cast<float>(unsure_speed) : 0.0f;
+    } else if (!map.is_settled(voxel, view.X_WC.translation(), view.camera.noise)) {
       fresh.push_back(index);
     }
   }
@@ -218,31 +218,46 @@ const Mover* Perception::Impl::mover_beside(std::size_t number, const Eigen::Vec
 
 Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
   find_velocities(views[number], time);
-  std::vector<int> handed = shown;
-  std::vector<const Mover*> as(shown.size(), nullptr);  // nullptr: as the camera itself says
+  handed.clear();
+  const auto as_camera_says = [&](int index, double age) {
+    const auto n = static_cast<std::size_t>(index);
+    handed.push_back({index, velocities[n].cast<double>(), static_cast<double>(uncertainties[n]), age});
+  };
+  for (const int index : shown) {
+    as_camera_says(index, 0.0);
+  }
   for (const int index : fresh) {
     const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
-    const Mover* const mover = voxel.moves ? nullptr : mover_beside(number, voxel.frame_middle(), time);
-    if (mover != nullptr) {
-      handed.push_back(index);
-      as.push_back(mover);
+    if (const Mover* const mover = voxel.moves ? nullptr : mover_beside(number, voxel.frame_middle(), time)) {
+      handed.push_back({index, mover->velocity, mover->uncertainty, 0.0});
     }
   }
-  const Obstacles all = balls(handed, true);
-  Eigen::Matrix3Xd speeds = all.velocities();
-  Eigen::VectorXd uncertainty(all.size());
-  for (Eigen::Index n = 0; n < all.size(); ++n) {
-    const auto k = static_cast<std::size_t>(n);
-    if (as[k] == nullptr) {
-      uncertainty[n] = static_cast<double>(uncertainties[static_cast<std::size_t>(handed[k])]);
-    } else {
-      uncertainty[n] = as[k]->uncertainty;
-      speeds.col(n) = as[k]->velocity;
+  for (const int index : last_remembered) {
+    const auto n = static_cast<std::size_t>(index);
+    const Voxel& voxel = map.voxels()[n];
+    const double age = time - voxel.last;
+    const bool is_seen_elsewhere = voxel.free_images > 0 || voxel.missed_images > 0;
+    const bool rested = uncertainties[n] == 0.0f && velocities[n].isZero(0.0f);
+    if (voxel.camera == number && !rested && !is_seen_elsewhere && age > 0.0 && age <= moves_unseen) {
+      as_camera_says(index, age);
     }
   }
-  return all.size() > 0 && !(speeds.isZero(0.0) && uncertainty.isZero(0.0))
-             ? all.moving(std::move(speeds), std::move(uncertainty))
-             : all;
+  const auto num = static_cast<Eigen::Index>(handed.size());
+  Eigen::Matrix3Xd points(3, num), speeds(3, num);
+  Eigen::VectorXd radii(num), uncertainty(num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const Handed& one = handed[static_cast<std::size_t>(n)];
+    const CellBall ball = ball_of(map.voxels()[static_cast<std::size_t>(one.voxel)], true);
+    points.col(n) = ball.centre + one.age * one.velocity;
+    radii[n] = ball.radius + one.age * one.uncertainty;
+    speeds.col(n) = one.velocity;
+    uncertainty[n] = one.uncertainty;
+  }
+  if (num == 0) {
+    return Obstacles::none();
+  }
+  const Obstacles all(std::move(points), std::move(radii), std::move(speeds));
+  return uncertainty.isZero(0.0) ? all : all.moving(all.velocities(), std::move(uncertainty));
 }
 
 void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {

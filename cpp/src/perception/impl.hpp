@@ -65,6 +65,14 @@ struct Perception::Impl {
     bool is_explained = false;
   };
 
+  /// What the controller is given of a cell: its ball where it was seen, moved on by its velocity for its age.
+  struct Handed {
+    int voxel;
+    Eigen::Vector3d velocity;  // [m/s]
+    double uncertainty;        // of the velocity [m/s]
+    double age;                // since an image showed it [s]
+  };
+
   Impl(Controller& controller, const std::vector<DepthCamera>& cameras, const PerceptionSettings& settings);
 
   std::size_t index(const std::string& camera) const;
@@ -80,13 +88,13 @@ struct Perception::Impl {
   void hand_over(std::size_t number, double time, PerceptionReport& report);
   /// The ball of a voxel; `moved`: around what the last image alone shows.
   CellBall ball_of(const Voxel& voxel, bool moved) const;
-  /// Those of several, with their velocities where they have moved.
+  /// Those of several, at rest.
   Obstacles balls(const std::vector<int>& chosen, bool moved) const;
   /// Finds the velocities of what a camera shows now and has not rested.
   void find_velocities(View& view, double time);
   /// What another camera than one sees moving near a point at a time [s]; null: nothing.
   const Mover* mover_beside(std::size_t number, const Eigen::Vector3d& point, double time) const;
-  /// What a camera shows, with velocities. What it cannot tell to move beside what another camera sees moving comes twice: at rest, and
+  /// What a camera shows, with velocities, and what it showed before where that moved or may move. What it cannot tell to move beside what another camera sees moving comes twice: at rest, and
   /// with that velocity.
   Obstacles moving_balls(std::size_t number, double time);
   /// Takes what other sources say, where it was at a time [s].
@@ -115,6 +123,7 @@ struct Perception::Impl {
   std::vector<Tested> tested;                          // one per voxel
   std::vector<int> fresh;                              // Voxels that a camera shows and that may move, in work.
   std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
+  std::vector<Handed> handed;                          // What a camera shows and has just shown, in work.
   std::vector<int> last_remembered;                    // The latter, as the controller has them.
   std::vector<Eigen::Vector3f> velocities;             // Per voxel, as the last image that showed it says [m/s].
   std::vector<float> uncertainties;                    // The same: how far they may be wrong [m/s].

@@ -293,12 +293,15 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
     return;
   }
   voxel.is_hidden = voxel.is_hidden || what == Sight::hidden;
-  const double was_seen = voxel.last - voxel.first;
-  const bool may_move = voxel.moves || was_seen < rests_after || voxel.shown_images < rests_images;
-  const double kept = may_move ? std::min(settings_.memory, kept_at_least + kept_per_seen * was_seen) : settings_.memory;
+  const double kept = may_move(voxel) ? std::min(settings_.memory, kept_at_least + kept_per_seen * (voxel.last - voxel.first))
+                                      : settings_.memory;
   if (seen.time - voxel.last > (voxel.counts ? kept : second_within)) {
     remove(voxel);
   }
+}
+
+bool VoxelMap::may_move(const Voxel& voxel) noexcept {
+  return voxel.moves || voxel.last - voxel.first < rests_after || voxel.shown_images < rests_images;
 }
 
 bool VoxelMap::is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept {

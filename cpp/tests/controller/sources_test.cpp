@@ -3,6 +3,7 @@
 
 #include "../../src/controller/sources.hpp"
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/stage_model.hpp"
 
 using namespace sidestep;
@@ -62,6 +63,32 @@ BOOST_AUTO_TEST_CASE(nothing_is_known_to_be_free_until_somebody_says_so) {
   seen.update();
   BOOST_TEST(!seen.sources.is_stale());
   seen.update(1e6);  // what rests in the scene is believed for ever
+  BOOST_TEST(!seen.sources.is_stale());
+}
+
+BOOST_AUTO_TEST_CASE(a_source_that_is_expected_is_overdue_until_it_comes) {
+  Seeing seen;
+  seen.registry.expect("left");
+  seen.set(test::ball(far_place, 0.1), {.source = "right", .time = 0.0});
+  BOOST_TEST(seen.registry.said().size() == 1u);
+  seen.update(0.1);
+  BOOST_TEST(seen.sources.is_stale());
+  BOOST_TEST(seen.sources.states().at(0).is_overdue);
+  BOOST_TEST(seen.sources.states().at(0).age == test::infinity);
+  BOOST_TEST(seen.sources.explain().find("source 'left' was expected and has not come yet") != std::string::npos);
+  seen.set(test::ball(far_place, 0.2), {.source = "left", .time = 0.1});
+  seen.registry.expect("left");  // it has come
+  seen.put();
+  seen.update(0.1);
+  BOOST_TEST(!seen.sources.is_stale());
+  BOOST_TEST(seen.sources.obstacles().size() == 2);
+  seen.registry.expect("front");
+  seen.put();
+  seen.update(0.01);
+  BOOST_TEST(seen.sources.is_stale());
+  seen.registry.remove("front");
+  seen.put();
+  seen.update(0.01);
   BOOST_TEST(!seen.sources.is_stale());
 }
 

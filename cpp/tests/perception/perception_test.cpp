@@ -287,6 +287,76 @@ BOOST_FIXTURE_TEST_CASE(what_appears_apart_from_what_rests_may_move, Watched) {
   }
 }
 
+BOOST_FIXTURE_TEST_CASE(what_the_first_image_of_a_fixed_camera_shows_may_move, Watched) {
+  camera.fx = camera.fy = 200.0;
+  for (const bool stands_still : {true, false}) {
+    start();
+    step();
+    const auto pose = stands_still ? std::nullopt : std::optional<Eigen::Isometry3d>(camera.pose);
+    for (int n = 0; n < 10; ++n) {
+      BOOST_TEST(look(Capture{time, {}, pose}).used);
+      BOOST_TEST_INFO("image " << n);
+      BOOST_TEST(said("front")->velocities().isZero(0.0));
+      if (n == 0) {
+        BOOST_TEST((said("front")->uncertainty().array() == (stands_still ? 0.5 : 0.0)).all());
+      }
+      time += 0.03;
+      step();
+    }
+    BOOST_TEST(said("front")->uncertainty().isZero(0.0));
+  }
+}
+
+BOOST_FIXTURE_TEST_CASE(what_moves_goes_on_where_something_hides_it, Watched) {
+  constexpr double speed = 0.5, period = 0.1;  // [m/s], [s]
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  scene.floor = -10.0;
+  Eigen::Vector3d centre = scene.balls.front().centre;
+  const auto see = [&](bool hidden) {
+    scene.balls.resize(1);
+    scene.balls.front().centre = centre;
+    if (hidden) {
+      scene.add_sphere({1.3, 0.4, 0.7}, 0.3);
+    }
+    look(Capture{time, {}, std::nullopt});
+    centre.y() -= speed * period;
+    time += period;
+    step();
+  };
+  const auto points_there = [&] {  // where it was in the last image
+    return points("front", centre + Eigen::Vector3d(0.15, speed * period, 0.0), 0.06);
+  };
+  for (int n = 0; n < 6; ++n) {
+    see(false);
+  }
+  const int shown = points_there();
+  BOOST_TEST(shown > 5);
+  for (int n = 0; n < 4; ++n) {
+    see(true);
+    BOOST_TEST_INFO("hidden for " << (n + 1) * period << " s");
+    BOOST_TEST(points_there() > shown / 3);  // none as long as it was remembered where it was seen last
+  }
+  see(true);
+  BOOST_TEST(points_there() == 0);  // nobody knows any more
+}
+
+BOOST_FIXTURE_TEST_CASE(the_arm_waits_for_each_of_its_cameras, Watched) {
+  DepthCamera back = test::small_camera({-1.6, 0.2, 0.9}, {0.0, 0.0, 0.6});
+  back.name = "back";
+  perception = std::make_unique<Perception>(controller, std::vector{camera, back}, settings);
+  step();
+  BOOST_TEST(controller.said().empty());
+  look();
+  BOOST_TEST((controller.command().activity == Activity::stale));
+  BOOST_TEST(controller.explain().find("'back' was expected and has not come yet") != std::string::npos);
+  const std::vector<float> pixels = scene.image(back);
+  perception->update("back", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+  look();
+  BOOST_TEST((controller.command().activity != Activity::stale));
+}
+
 BOOST_FIXTURE_TEST_CASE(what_leaves_the_image_keeps_its_velocity, Watched) {
   constexpr double noise = 0.02, period = 0.1;  // [m], [s]
   camera.fx = camera.fy = 200.0;

@@ -136,7 +136,9 @@ class Controller {
   /// on, up to the age for which the source is valid; beyond it the arm stops until the source comes again, see SourceOptions. An empty
   /// set after one with points is believed once it has been empty for SourceSettings::empty_after.
   void set_obstacles(Obstacles obstacles, const SourceOptions& options = {});
-  /// Forgets a source, at once.
+  /// Tells that a source will come: the arm stays where it is until it has said something. A source that has, stays as it is.
+  void expect_obstacles(const std::string& source);
+  /// Forgets a source, at once; also one that was expected.
   void remove_obstacles(const std::string& source);
   /// Adds named points to a source, see Obstacles::named. Throws also where it has something of that name.
   void add_obstacle(const Obstacles& obstacle, const std::string& source = SourceOptions::scene);

@@ -34,7 +34,7 @@ struct SourceContent {
 struct SourceState {
   std::string name;
   int size = 0;             ///< number of points
-  double age = 0.0;         ///< time since what is believed was captured [s]
+  double age = 0.0;         ///< time since what is believed was captured [s]; inf: it was expected, and has not come yet
   double valid_for = 0.0;   ///< age up to which it is believed [s]
   bool is_overdue = false;  ///< older than that: the arm stops until it comes again
   bool is_emptied = false;  ///< newer sets are empty, and not believed yet

@@ -90,6 +90,8 @@ class VoxelMap {
   bool is_background(const Voxel& voxel) const noexcept {
     return grid_.level(voxel.cell) > 0 && voxel.last - voxel.first > background_after;
   }
+  /// Whether what is in a voxel may move: it did when it was seen last, or was seen for too little to be known to rest.
+  static bool may_move(const Voxel& voxel) noexcept;
   /// Whether a voxel has rested: it has been seen for long, or noise along the ray explains it by one that has.
   bool is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept;
   /// Whether a cell next to it has been seen for long.
