@@ -263,7 +263,9 @@ void SourceRegistry::add(const Obstacles& obstacles, const std::string& source) 
   }
   groups.add(obstacles);
   Entry& entry = at_or_new(source);
-  const double time = entry.set.time, valid_for = entry.set.valid_for;
+  const bool has_come = entry.set.time != SourceSet::not_come;
+  const double time = has_come ? entry.set.time : SourceOptions::untold;
+  const double valid_for = has_come ? entry.set.valid_for : settings_.obstacle_timeout;
   replace(entry, groups.obstacles(), {source, time, valid_for}, no_time);
 }
 

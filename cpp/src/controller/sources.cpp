@@ -119,6 +119,8 @@ double Sources::age(std::size_t k) const noexcept {
          (motion_.parts[k].hidden || buffer_.current().sources[k].points->size() == 0 ? known_[k].heard : known_[k].time);
 }
 
+bool Sources::has_not_come(std::size_t k) const noexcept { return buffer_.current().sources[k].time == SourceSet::not_come; }
+
 void Sources::judge_ages() noexcept {
   const World& world = buffer_.current();
   overdue_ = -1;
@@ -127,7 +129,7 @@ void Sources::judge_ages() noexcept {
   bool any = false;
   for (std::size_t k = 0; k < std::min(num_known_, world.sources.size()); ++k) {
     const double late = age(k) - world.sources[k].valid_for;
-    const double beyond = known_[k].ahead > most_ahead ? infinity : late;
+    const double beyond = known_[k].ahead > most_ahead || has_not_come(k) ? infinity : late;
     if (beyond > most) {
       most = beyond;
       overdue_ = static_cast<int>(k);
@@ -167,7 +169,8 @@ std::vector<SourceState> Sources::states() const {
     const SourceSet& set = buffer_.current().sources[k];
     const bool believed_empty = motion_.parts[k].hidden;
     states.push_back({set.name, believed_empty ? 0 : static_cast<int>(set.points->size()), age(k), set.valid_for,
-                      age(k) > set.valid_for || known_[k].ahead > most_ahead, set.emptied && !believed_empty});
+                      age(k) > set.valid_for || known_[k].ahead > most_ahead || has_not_come(k),
+                      set.emptied && !believed_empty});
   }
   return states;
 }
@@ -182,7 +185,7 @@ std::string Sources::explain() const {
   const auto k = static_cast<std::size_t>(overdue_);
   const SourceSet& set = buffer_.current().sources[k];
   const std::string who = "source '" + set.name + "' ";
-  if (set.time == SourceSet::not_come) {
+  if (has_not_come(k)) {
     return who + "was expected and has not come yet; the arm goes on when it does";
   }
   if (known_[k].ahead > most_ahead) {

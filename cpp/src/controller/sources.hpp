@@ -69,6 +69,8 @@ class Sources {
   bool believe_empty(double time) noexcept;
   void judge_ages() noexcept;
   double age(std::size_t k) const noexcept;
+  /// Whether source k is expected.
+  bool has_not_come(std::size_t k) const noexcept;
 
   const ClearanceQuery& body_;
   ClearanceQuery::Workspace workspace_;

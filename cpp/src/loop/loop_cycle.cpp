@@ -21,6 +21,16 @@ constexpr double rest_speed = 0.1;  // Share of the arrival speed below which th
 constexpr const char* denied = "a command was not approved";
 constexpr int first_steps = 3;  // Steps before the first motion: a clock that begins anew costs one.
 
+/// A source that is expected and has not come; empty: there is none.
+std::string missing_source(const Controller& controller) {
+  for (const SourceState& source : controller.sources()) {
+    if (source.age == std::numeric_limits<double>::infinity()) {
+      return source.name;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 LoopCycle::LoopCycle(Controller& controller, Driver& driver, const LoopSettings& settings,
@@ -74,15 +84,19 @@ void LoopCycle::step_until_the_world_is_known() {
     for (CycleObserver* const observer : observers_) {
       observer->observe_before_motion(state_, command, monotonic_time());
     }
-    if (!controller_.said().empty()) {
+    const std::string missing = missing_source(controller_);
+    if (missing.empty() && !controller_.said().empty()) {
       ++known;
       if (status != SafetyStatus::stopping) {
         return;
       }
     } else if (monotonic_time() > give_up) {
       throw std::runtime_error(
-          "loop: no obstacles are known, so the arm would stay where it is; call set_obstacles (Obstacles.none() where nothing is in "
-          "the way), or feed images to a Perception");
+          !missing.empty()
+              ? "loop: source '" + missing +
+                    "' was expected and has not come, so the arm would stay where it is; start it, or call remove_obstacles"
+              : "loop: no obstacles are known, so the arm would stay where it is; call set_obstacles (Obstacles.none() where nothing is "
+                "in the way), or feed images to a Perception");
     }
     if (!driver_.description().paced) {
       sleep_until(monotonic_time() + period_);

@@ -22,6 +22,7 @@ constexpr double small_cell = 0.05;      // of that edge at most [m],
 constexpr double sure_age = 0.13;        // and time for which they must move away from what rests to be none [s].
 constexpr double unsure_speed = 0.5;     // Uncertainty of what appears apart from what rests, at most [m/s].
 constexpr double moves_unseen = 0.4;     // Time for which what moved or may move goes on where no image shows it [s].
+constexpr double least_shown = 0.01;     // Time for which an image counts until the next one, at least [s].
 constexpr double grown = 0.002;          // Growth of a box since it was compared, from which on it is compared again [m].
 
 /// Adds a cell that moves to what has its velocity.
@@ -35,6 +36,15 @@ void add_mover(std::vector<Mover>& movers, const Mover& cell) {
     known->cells += cell.cells;
     known->is_apart = known->is_apart || cell.is_apart;
   }
+}
+
+/// A voxel as it is when what is in it has moved on [m].
+Voxel moved_by(Voxel voxel, const Eigen::Vector3d& way) {
+  for (float* const corner : {voxel.low, voxel.high, voxel.frame_low, voxel.frame_high}) {
+    Eigen::Map<Eigen::Vector3f> at(corner);
+    at += way.cast<float>();
+  }
+  return voxel;
 }
 
 /// Drops few cells that can be the noise of what rests, where nothing larger moves: they come and go beside it, and line up now and then.
@@ -216,52 +226,61 @@ const Mover* Perception::Impl::mover_beside(std::size_t number, const Eigen::Vec
   return nearest;
 }
 
-Obstacles Perception::Impl::moving_balls(std::size_t number, double time) {
-  find_velocities(views[number], time);
+Obstacles Perception::Impl::moving_balls(const SeenImage& seen) {
+  const std::size_t number = seen.number;
+  find_velocities(views[number], seen.time);
   handed.clear();
-  const auto as_camera_says = [&](int index, double age) {
-    const auto n = static_cast<std::size_t>(index);
-    handed.push_back({index, velocities[n].cast<double>(), static_cast<double>(uncertainties[n]), age});
-  };
   for (const int index : shown) {
-    as_camera_says(index, 0.0);
+    const auto n = static_cast<std::size_t>(index);
+    handed.push_back({index, velocities[n].cast<double>(), static_cast<double>(uncertainties[n]), 0.0});
   }
   for (const int index : fresh) {
     const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];
-    if (const Mover* const mover = voxel.moves ? nullptr : mover_beside(number, voxel.frame_middle(), time)) {
+    if (const Mover* const mover = voxel.moves ? nullptr : mover_beside(number, voxel.frame_middle(), seen.time)) {
       handed.push_back({index, mover->velocity, mover->uncertainty, 0.0});
     }
   }
+  // What is not shown any more goes on, and what its velocity may be wrong by counts for as long: T u' = (T + age) u.
+  const double shown_for = std::max({controller.time() - seen.time, seen.time - views[number].before, least_shown});
   for (const int index : last_remembered) {
     const auto n = static_cast<std::size_t>(index);
     const Voxel& voxel = map.voxels()[n];
-    const double age = time - voxel.last;
-    const bool is_seen_elsewhere = voxel.free_images > 0 || voxel.missed_images > 0;
+    const double age = seen.time - voxel.last;
     const bool rested = uncertainties[n] == 0.0f && velocities[n].isZero(0.0f);
-    if (voxel.camera == number && !rested && !is_seen_elsewhere && age > 0.0 && age <= moves_unseen) {
-      as_camera_says(index, age);
+    const bool was_seen_empty = voxel.free_images > 0 || voxel.missed_images > 0;
+    if (voxel.camera != number || rested || was_seen_empty || !(age > 0.0 && age <= moves_unseen)) {
+      continue;
     }
+    const Eigen::Vector3d velocity = velocities[n].cast<double>();
+    const Voxel moved = moved_by(voxel, age * velocity);
+    if (!map.sees_through(moved, seen) && !is_left_out(moved)) {
+      handed.push_back({index, velocity, static_cast<double>(uncertainties[n]) * (1.0 + age / shown_for), age});
+    }
+  }
+  if (handed.empty()) {
+    return Obstacles::none();
   }
   const auto num = static_cast<Eigen::Index>(handed.size());
   Eigen::Matrix3Xd points(3, num), speeds(3, num);
   Eigen::VectorXd radii(num), uncertainty(num);
   for (Eigen::Index n = 0; n < num; ++n) {
     const Handed& one = handed[static_cast<std::size_t>(n)];
-    const CellBall ball = ball_of(map.voxels()[static_cast<std::size_t>(one.voxel)], true);
-    points.col(n) = ball.centre + one.age * one.velocity;
-    radii[n] = ball.radius + one.age * one.uncertainty;
+    CellBall ball = ball_of(map.voxels()[static_cast<std::size_t>(one.voxel)], true);
+    if (one.age > 0.0) {
+      ball.centre += one.age * one.velocity;
+      ball = in_single_precision(ball);
+    }
+    points.col(n) = ball.centre;
+    radii[n] = ball.radius;
     speeds.col(n) = one.velocity;
     uncertainty[n] = one.uncertainty;
-  }
-  if (num == 0) {
-    return Obstacles::none();
   }
   const Obstacles all(std::move(points), std::move(radii), std::move(speeds));
   return uncertainty.isZero(0.0) ? all : all.moving(all.velocities(), std::move(uncertainty));
 }
 
-void Perception::Impl::hand_over(std::size_t number, double time, PerceptionReport& report) {
-  find_told(time);
+void Perception::Impl::hand_over(const SeenImage& seen, PerceptionReport& report) {
+  find_told(seen.time);
   const std::vector<Voxel>& voxels = map.voxels();
   tested.resize(voxels.size());
   is_excluded.resize(voxels.size());
@@ -294,8 +313,7 @@ void Perception::Impl::hand_over(std::size_t number, double time, PerceptionRepo
     controller.set_obstacles(balls(remembered, false), {memory_source, SourceOptions::untold, ever, true});
     last_remembered.swap(remembered);
   }
-  View& view = views[number];
-  controller.set_obstacles(moving_balls(number, time), {view.camera.name, time, settings.valid_for, true});
+  controller.set_obstacles(moving_balls(seen), {seen.camera.name, seen.time, settings.valid_for, true});
   report.seen = static_cast<int>(shown.size());
   report.remembered = static_cast<int>(last_remembered.size());
   report.unseen = static_cast<int>(border.cols());

@@ -65,7 +65,7 @@ struct Perception::Impl {
     bool is_explained = false;
   };
 
-  /// What the controller is given of a cell: its ball where it was seen, moved on by its velocity for its age.
+  /// What the controller is given of a cell: its ball where it was seen, moved on by its velocity for its age; its size stays.
   struct Handed {
     int voxel;
     Eigen::Vector3d velocity;  // [m/s]
@@ -85,7 +85,7 @@ struct Perception::Impl {
   void add_unseen(const SeenImage& seen);
   void judge(View& view, PerceptionReport& report) const;
   /// Gives the controller what the camera shows, and what no camera shows now.
-  void hand_over(std::size_t number, double time, PerceptionReport& report);
+  void hand_over(const SeenImage& seen, PerceptionReport& report);
   /// The ball of a voxel; `moved`: around what the last image alone shows.
   CellBall ball_of(const Voxel& voxel, bool moved) const;
   /// Those of several, at rest.
@@ -94,9 +94,9 @@ struct Perception::Impl {
   void find_velocities(View& view, double time);
   /// What another camera than one sees moving near a point at a time [s]; null: nothing.
   const Mover* mover_beside(std::size_t number, const Eigen::Vector3d& point, double time) const;
-  /// What a camera shows, with velocities, and what it showed before where that moved or may move. What it cannot tell to move beside what another camera sees moving comes twice: at rest, and
-  /// with that velocity.
-  Obstacles moving_balls(std::size_t number, double time);
+  /// What a camera shows, with velocities, and what it showed before where that moved or may move and is hidden. What it cannot tell to
+  /// move beside what another camera sees moving comes twice: at rest, and with that velocity.
+  Obstacles moving_balls(const SeenImage& seen);
   /// Takes what other sources say, where it was at a time [s].
   void find_told(double time);
   bool is_explained(std::size_t voxel);

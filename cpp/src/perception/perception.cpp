@@ -64,6 +64,9 @@ Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras,
     }
   }
   impl_ = std::make_unique<Impl>(controller, cameras_, settings_);
+  for (const DepthCamera& camera : cameras_) {
+    controller.expect_obstacles(camera.name);
+  }
 }
 Perception::~Perception() = default;
 
@@ -132,7 +135,7 @@ PerceptionReport Perception::Impl::update(std::size_t number, const Capture& cap
   view.time = time;
   view.begin = std::isnan(view.begin) ? time : view.begin;
   judge(view, report);
-  hand_over(number, time, report);
+  hand_over(seen, report);
   report.obstacles_time = since(mark);
   report.used = true;
   return report;

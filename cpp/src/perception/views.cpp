@@ -29,7 +29,6 @@ Perception::Impl::Impl(Controller& its, const std::vector<DepthCamera>& cameras,
   views.reserve(cameras.size());
   for (const DepthCamera& camera : cameras) {
     views.emplace_back(camera, *arm, settings.steady_images);
-    controller.expect_obstacles(camera.name);
   }
   if (!settings.unseen_is_free) {
     unseen.emplace(reach.centre, reach.radius, settings);

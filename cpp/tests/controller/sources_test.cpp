@@ -90,6 +90,24 @@ BOOST_AUTO_TEST_CASE(a_source_that_is_expected_is_overdue_until_it_comes) {
   seen.put();
   seen.update(0.01);
   BOOST_TEST(!seen.sources.is_stale());
+  seen.registry.expect("table");
+  seen.registry.add(test::ball(far_place, 0.1).named({"box"}, {1}), "table");
+  seen.put();
+  seen.update(10.0);  // the others are too old then
+  BOOST_TEST(!seen.sources.states().back().is_overdue);
+}
+
+BOOST_AUTO_TEST_CASE(an_expected_source_is_overdue_where_all_others_are_believed_for_ever) {
+  ControllerSettings settings = test::straight_settings(Output::position);
+  settings.sources.valid_for = test::infinity;
+  Seeing seen(settings);
+  seen.set(Obstacles::none());
+  seen.registry.expect("side");
+  seen.put();
+  seen.update();
+  BOOST_TEST(seen.sources.is_stale());
+  BOOST_TEST(seen.sources.states().back().is_overdue);
+  BOOST_TEST(seen.sources.explain().find("source 'side' was expected") != std::string::npos);
 }
 
 BOOST_AUTO_TEST_CASE(a_timeout_is_of_every_source_without_a_validity_of_its_own) {

@@ -360,6 +360,12 @@ BOOST_AUTO_TEST_CASE(nothing_is_written_before_state_and_world_are_known) {
     CHECK_SAYS(loop.start(), std::runtime_error, "no obstacles are known");
     CHECK_SAYS(loop.start(), std::runtime_error, "a run starts once");
   }
+  untold.set_obstacles(Obstacles::none());
+  untold.expect_obstacles("side");
+  {
+    Loop loop(untold, driver, {.start_timeout = 0.05});
+    CHECK_SAYS(loop.start(), std::runtime_error, "source 'side' was expected and has not come");
+  }
   Setup s;
   s.driver.fault_ = [](int) { return DriverResult::waiting; };
   {

@@ -342,6 +342,65 @@ BOOST_FIXTURE_TEST_CASE(what_moves_goes_on_where_something_hides_it, Watched) {
   BOOST_TEST(points_there() == 0);  // nobody knows any more
 }
 
+BOOST_FIXTURE_TEST_CASE(what_goes_on_unseen_is_dropped_where_the_image_sees_through_it, Watched) {
+  constexpr double speed = 1.0, period = 0.1;  // [m/s], [s]
+  camera.fx = camera.fy = 200.0;
+  start();
+  step();
+  scene.floor = -10.0;
+  Eigen::Vector3d centre(0.2, 1.0, 0.5);
+  scene.balls.resize(1);
+  for (int n = 0; n < 9; ++n) {  // in the end it stands still behind something as large
+    scene.balls.resize(1);
+    scene.balls.front().centre = centre;
+    if (n == 7) {
+      scene.add_sphere({0.7, 0.41, 0.6}, 0.16);
+    }
+    look(Capture{time, {}, std::nullopt});
+    centre.y() -= n < 6 ? speed * period : 0.0;
+    time += period;
+    step();
+  }
+  const auto set = said("front");
+  const Eigen::Isometry3d X_CW = camera.pose.inverse();
+  const std::vector<float> image = scene.image(camera);
+  int seen_through = 0;
+  for (Eigen::Index n = 0; n < set->size(); ++n) {
+    const Eigen::Vector3d at = X_CW * set->points().col(n);
+    const Eigen::Vector2d pixel = camera.project(at);
+    const auto u = static_cast<std::size_t>(std::lround(pixel.x())), v = static_cast<std::size_t>(std::lround(pixel.y()));
+    seen_through += image[v * static_cast<std::size_t>(camera.width) + u] > at.z() + 0.1 ? 1 : 0;
+  }
+  BOOST_TEST(seen_through <= 8);  // at its edge; 42 as long as nobody looked
+}
+
+BOOST_FIXTURE_TEST_CASE(an_arm_beside_a_wall_rests_while_its_first_images_come, Watched) {
+  camera.fx = camera.fy = 150.0;
+  camera.noise = {0.002, 0.0};
+  camera.translation_error = 0.005;
+  scene.floor = -10.0;
+  scene.balls.clear();
+  scene.add_sphere({-100.075, 0.0, 0.6}, 100.0);  // its surface is 3 cm behind the arm
+  scene.add_arm(arm.robot(), arm.body(), q);
+  start();
+  step();
+  std::uniform_real_distribution<float> share;
+  for (int n = 0; n < 20; ++n) {
+    std::vector<float> pixels = scene.image(camera);
+    for (float& depth : pixels) {
+      depth = share(random) < 0.05f ? 0.0f : depth + static_cast<float>(camera.noise.constant) * error(random);
+    }
+    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    for (int k = 0; k < 33; ++k) {
+      time += 0.001;
+      const Command& command = controller.step(q, Eigen::VectorXd::Zero(4), time);
+      BOOST_TEST_INFO("image " << n << ", step " << k);
+      BOOST_TEST((command.status == SafetyStatus::ok));
+      BOOST_TEST(command.acceleration.cwiseAbs().maxCoeff() < 0.2);  // of 20: noise alone
+    }
+  }
+}
+
 BOOST_FIXTURE_TEST_CASE(the_arm_waits_for_each_of_its_cameras, Watched) {
   DepthCamera back = test::small_camera({-1.6, 0.2, 0.9}, {0.0, 0.0, 0.6});
   back.name = "back";

@@ -96,6 +96,10 @@ class VoxelMap {
   bool is_settled(const Voxel& voxel, const Eigen::Vector3d& eye, const DepthNoise& noise) const noexcept;
   /// Whether a cell next to it has been seen for long.
   bool is_beside_rest(const Voxel& voxel) const noexcept;
+  /// Whether an image sees through the box of a voxel.
+  bool sees_through(const Voxel& voxel, const SeenImage& seen) const noexcept {
+    return sight(voxel, seen, seen.X_WC.inverse()) == Sight::free;
+  }
   double edge(const Voxel& voxel) const noexcept { return grid_.edge(grid_.level(voxel.cell)); }
   /// Indices of the voxels that the last image showed.
   const std::vector<int>& touched() const noexcept { return touched_; }
