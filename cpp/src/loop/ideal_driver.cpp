@@ -9,6 +9,8 @@ namespace sidestep {
 namespace {
 
 constexpr double longest_pause = 0.1, longest_periods = 5.0;  // Time for which it holds a command [s], [periods]; as of Clock.
+constexpr double beyond_speed = 1.2,
+                 beyond_stop = 0.1;  // Drives and stops of a real arm: no command asks for more [limits], [rad | m].
 
 }  // namespace
 
@@ -45,10 +47,26 @@ DriverResult IdealDriver::read(RobotState& state, double) noexcept {
     const double held = passed > std::max(longest_pause, longest_periods * period) ? period : passed;
     state_.v += held * acceleration_;
     state_.q += held * state_.v;
+    if (held > period) {
+      keep_within_drives();
+    }
   }
   has_command_ = false;
   state = state_;
   return DriverResult::ok;
+}
+
+void IdealDriver::keep_within_drives() noexcept {
+  const JointLimits& limits = description_.limits;
+  for (Eigen::Index k = 0; k < state_.q.size(); ++k) {
+    const double fastest = beyond_speed * limits.velocity[k];
+    state_.v[k] = std::clamp(state_.v[k], -fastest, fastest);
+    const double stopped = std::clamp(state_.q[k], limits.lower[k] - beyond_stop, limits.upper[k] + beyond_stop);
+    if (stopped != state_.q[k]) {
+      state_.q[k] = stopped;
+      state_.v[k] = 0.0;
+    }
+  }
 }
 
 DriverResult IdealDriver::write(const Command& command) noexcept {

@@ -38,6 +38,28 @@ BOOST_AUTO_TEST_CASE(a_command_is_held_until_the_robot_is_read_again) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(commands_that_are_held_for_too_long_do_not_drive_it_beyond_its_drives_and_stops,
+                     *boost::unit_test::timeout(60)) {
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  const JointLimits& limits = arm.robot().limits();
+  IdealDriver robot(arm, Eigen::VectorXd::Zero(nv));
+  robot.start(Output::acceleration);
+  RobotState state(nv);
+  Command command(nv);
+  for (int n = 0; n < 100; ++n) {  // brakes by v / 5 ms, for 20 ms: four times as fast the other way each time
+    robot.read(state, 0.0);
+    command.acceleration = -200.0 * state.v;
+    command.acceleration[0] += 1.0;
+    robot.write(command);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    robot.read(state, 0.0);
+    robot.write(command);
+    BOOST_TEST((state.v.cwiseAbs() - 1.3 * limits.velocity).maxCoeff() <= 0.0);
+    BOOST_TEST((state.q - limits.upper).maxCoeff() <= 0.1 + 1e-9);
+    BOOST_TEST((limits.lower - state.q).maxCoeff() <= 0.1 + 1e-9);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(a_robot_that_takes_velocities_does_not_go_on_with_an_acceleration_before) {
   const Arm arm = covered_arm(test::arm_limits(nv));
   IdealDriver robot(arm, Eigen::VectorXd::Zero(nv), 0.001, false);
