@@ -36,6 +36,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
     controller.set_obstacles(ss.Obstacles.none())
     camera = DepthCamera("front", width=4, height=3, fx=4.0, fy=4.0, cx=1.5, cy=1.0, pose=np.eye(4))
     perception = Perception(controller, [camera])
+    controller.remove_obstacles("front")  # the arm does not wait for it: few tests send images
     server = Server(controller, str(tmp_path / "arm.sock"), perception=perception)
     settings = LoopSettings(priority=0, lock_memory=False, longest_gap=10.0, state_timeout=10.0)
     loop = Loop(controller, Ideal(arm), settings, observers=[server])
