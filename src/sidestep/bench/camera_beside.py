@@ -163,8 +163,8 @@ class BesideRow:
         with on_cores(self._loop_cores):
             self._controller.set_goal(q)
             steps = max(1, round(STEPS_PER_SECOND * seconds))
-            # A machine that is too busy is what is measured: it ends no run.
-            kept = LoopSettings(kept_times=steps, longest_gap=10.0, duration=seconds)
+            # A machine that is too busy is what is measured, wherever the arm comes to by that: it ends no run.
+            kept = LoopSettings(kept_times=steps, longest_gap=10.0, duration=seconds, start_in_contact=True)
             run = Loop(self._controller, Ideal(self._arm, q), kept)
             run.start()
         begin = monotonic()
