@@ -49,11 +49,13 @@ struct Watched {
     step();
     return report;
   }
-  /// An image with the constant noise of the camera; no time passes.
-  void look_with_noise() {
+  /// An image with the constant noise of the camera, and a share of its pixels without a depth; no time passes.
+  void look_with_noise(float holes = 0.0f) {
     std::vector<float> pixels = scene.image(camera);
+    std::uniform_real_distribution<float> share;
     for (float& depth : pixels) {
-      depth += depth > 0.0f ? static_cast<float>(camera.noise.constant) * error(random) : 0.0f;
+      const bool is_hole = holes > 0.0f && share(random) < holes;
+      depth = is_hole ? 0.0f : depth > 0.0f ? depth + static_cast<float>(camera.noise.constant) * error(random) : depth;
     }
     perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
   }
@@ -384,13 +386,8 @@ BOOST_FIXTURE_TEST_CASE(an_arm_beside_a_wall_rests_while_its_first_images_come, 
   scene.add_arm(arm.robot(), arm.body(), q);
   start();
   step();
-  std::uniform_real_distribution<float> share;
   for (int n = 0; n < 20; ++n) {
-    std::vector<float> pixels = scene.image(camera);
-    for (float& depth : pixels) {
-      depth = share(random) < 0.05f ? 0.0f : depth + static_cast<float>(camera.noise.constant) * error(random);
-    }
-    perception->update("front", RawDepth{std::span<const float>(pixels), 1.0}, Capture{time, {}, std::nullopt});
+    look_with_noise(0.05f);
     for (int k = 0; k < 33; ++k) {
       time += 0.001;
       const Command& command = controller.step(q, Eigen::VectorXd::Zero(4), time);

@@ -42,8 +42,9 @@ struct PerceptionReport {
 
 /// From depth cameras to the obstacles of a controller: takes the arm out of the image, remembers what is hidden, and hands the rest on.
 ///
-/// Each camera is a source of the controller, of its name, which is expected from construction on: the arm waits for its first image. What no
-/// camera shows now is the source `memory`; where nobody has looked, if that counts as occupied, `unseen`. Calls from several threads wait for each other; none of them waits for `step`.
+/// Each camera is a source of the controller, of its name. It is expected from construction on: the arm waits for its first image. What no
+/// camera shows now is the source `memory`; where nobody has looked, if that counts as occupied, `unseen`. Calls from several threads wait
+/// for each other; none of them waits for `step`.
 class Perception {
  public:
   static constexpr const char* memory_source = "memory";
