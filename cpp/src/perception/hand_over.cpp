@@ -158,6 +158,7 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
 
 void Perception::Impl::find_velocities(View& view, double time) {
   fresh.clear();
+  jumped.clear();
   view.movers.clear();
   const auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
   const Sight sight = [sees](const Eigen::Vector3d& place) { return sees->shows(place); };
@@ -168,11 +169,15 @@ void Perception::Impl::find_velocities(View& view, double time) {
     map.set_moves(index, false);
     const Voxel& voxel = map.voxels()[n];
     // What the first image shows may rest, and is known to once others have shown it; what moves comes to other cells.
-    if (voxel.first <= view.begin) {
+    if (voxel.first <= view.begin || time <= view.begin) {
       uncertainties[n] = view.stands_still && VoxelMap::may_move(voxel) ? static_cast<float>(unsure_speed) : 0.0f;
     } else if (!map.is_settled(voxel, view.X_WC.translation(), view.camera.noise)) {
       fresh.push_back(index);
     }
+  }
+  if (time <= view.begin) {
+    view.motion.begin(balls(shown, true), time, sight);
+    return;
   }
   if (fresh.empty()) {
     view.motion.forget();
@@ -200,6 +205,9 @@ void Perception::Impl::find_velocities(View& view, double time) {
       velocities[at] = found.velocities.col(n).cast<float>();
       uncertainties[at] = static_cast<float>(found.uncertainty[n]);
       map.set_moves(index, true);
+      if (found.sets[n] == 2) {
+        jumped.push_back(index);
+      }
     } else if (view.stands_still && !map.is_beside_rest(map.voxels()[at])) {
       // A velocity that is not believed is not known to be zero either.
       uncertainties[at] = static_cast<float>(std::min(unsure_speed, found.uncertainty[n] + found.velocities.col(n).norm()));
@@ -233,6 +241,9 @@ Obstacles Perception::Impl::moving_balls(const SeenImage& seen) {
   for (const int index : shown) {
     const auto n = static_cast<std::size_t>(index);
     handed.push_back({index, velocities[n].cast<double>(), static_cast<double>(uncertainties[n]), 0.0});
+  }
+  for (const int index : jumped) {  // two images can be wrong
+    handed.push_back({index, Eigen::Vector3d::Zero(), unsure_speed, 0.0});
   }
   for (const int index : fresh) {
     const Voxel& voxel = map.voxels()[static_cast<std::size_t>(index)];

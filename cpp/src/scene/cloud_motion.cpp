@@ -34,7 +34,13 @@ constexpr double split_distance = 0.008;   // Distance from the oldest set that 
 constexpr double held = 1.5;               // Spacings of the sets for which the same points again say nothing new [-].
 constexpr std::size_t few_clusters = 300;  // Number of clusters up to which every pair is compared.
 constexpr int cut_iterations = 10;         // Steps to the way of what is cut.
-constexpr std::size_t stray_points = 3;    // Number of points of a cluster that can be noise of the background, at most.
+constexpr double long_wait = 0.05;        // Spacing from which on two sets alone can tell a motion: a third one comes late [s],
+constexpr double longest_jump = 0.25;     // up to which they can [s],
+constexpr std::size_t least_jumping = 8;  // of so many points at least,
+constexpr double least_jump = 0.03;       // whose displacement is larger than this [m],
+constexpr double surely_jumped = 6.0;     // and than so many standard deviations.
+constexpr double jump_slip = 0.5;         // Its relative error: what is seen of a thing changes as it goes [-].
+constexpr std::size_t stray_points = 3;   // Number of points of a cluster that can be noise of the background, at most.
 
 const Sight everywhere;
 
@@ -52,6 +58,17 @@ void CloudMotion::forget() {
   sets_.clear();
   memory_.forget();
   noise_ = 0.0;
+  is_first_look_ = false;
+}
+
+void CloudMotion::begin(const Eigen::Matrix3Xd& points, double time, Sight sight) {
+  forget();
+  const auto num = static_cast<std::size_t>(points.cols());
+  Set set{
+      time, points, PointGrid(points), std::move(sight), {}, std::vector<PointMotion>(num, {.uncertainty = largest_speed_})};
+  add_clusters(set, std::vector<char>(num, 0), std::vector<char>(num, 1));
+  sets_.push_front(std::move(set));
+  is_first_look_ = true;
 }
 
 bool CloudMotion::is_repeated(const Eigen::Matrix3Xd& points, double time) const {
@@ -89,6 +106,9 @@ std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, dou
   learn_noise(set);
   split(set);
   spread_out(set, rests);
+  if (std::exchange(is_first_look_, false)) {
+    sets_.clear();
+  }
   sets_.push_front(std::move(set));
   if (sets_.size() >= most_sets) {
     sets_.pop_back();
@@ -308,7 +328,7 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bo
       continue;
     }
     const Way common = way_back(cluster, now, other, last);
-    const bool moved = !other.motion.velocity.isZero(0.0);
+    const bool moved = other.motion.sets > 2 && !other.motion.velocity.isZero(0.0);  // by more than a jump
     if (common.shift) {
       starts.shifts.push_back({*common.shift, moved});
     }
@@ -345,8 +365,7 @@ void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& n
     error = std::max(error, then.error);
   }
   if (num == 2) {
-    const double way = match.registration.shift.norm() + sure * error;
-    cluster.motion = {.uncertainty = std::min(largest_speed_, way / (time - sets_[0].time)), .sets = num};
+    follow_jump(cluster, match.registration.shift, error, time);
     return;
   }
   const LineFit<3> newest(positions, times, 3);
@@ -369,6 +388,29 @@ void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& n
   cluster.motion = {.uncertainty = std::min(largest_speed_, moves ? off : off + speed), .sets = num};
   if (moves) {
     cluster.motion.velocity = line.velocity * std::min(1.0, largest_speed_ / speed);
+  }
+}
+
+bool CloudMotion::has_jumped(const Cluster& cluster, double way, double error, double duration) const {
+  const Sight& sight = sets_[0].sight;
+  if (!sight || duration < long_wait || duration > longest_jump || cluster.points.size() < least_jumping ||
+      way <= std::max(least_jump, surely_jumped * std::max(error, noise_))) {
+    return false;
+  }
+  Eigen::Index num = 0;
+  for (Eigen::Index n = 0; n < cluster.sample.cols(); ++n) {
+    num += sight(cluster.sample.col(n)) ? 1 : 0;
+  }
+  return 3 * num >= 2 * cluster.sample.cols();  // else it may have been there, and hidden
+}
+
+void CloudMotion::follow_jump(Cluster& cluster, const Eigen::Vector3d& shift, double error, double time) const {
+  const double duration = time - sets_[0].time, way = shift.norm();
+  cluster.motion = {.uncertainty = std::min(largest_speed_, (way + sure * error) / duration), .sets = 2};
+  if (has_jumped(cluster, way, error, duration)) {
+    const double most = largest_speed_ * duration;
+    cluster.motion.velocity = -shift / duration * std::min(1.0, most / way);
+    cluster.motion.uncertainty = std::min(most, sphere * few_positions(3) * error + jump_slip * way) / duration;
   }
 }
 

@@ -118,6 +118,13 @@ VelocityEstimate::Result VelocityEstimate::update(const Obstacles& now, double t
   return impl_->update(now, time, std::move(sight));
 }
 
+void VelocityEstimate::begin(const Obstacles& first, double time, Sight sight) {
+  require(std::isfinite(time), "time", time, "finite");
+  forget();
+  impl_->last = time;
+  impl_->clouds.begin(first.points(), time, std::move(sight));
+}
+
 void VelocityEstimate::forget() { *impl_ = Impl(impl_->settings); }
 
 }  // namespace sidestep

@@ -309,6 +309,76 @@ BOOST_FIXTURE_TEST_CASE(what_the_first_image_of_a_fixed_camera_shows_may_move, W
   }
 }
 
+BOOST_FIXTURE_TEST_CASE(two_slow_images_tell_that_something_moves, Watched) {
+  constexpr double period = 0.1, speed = 0.6, noise = 0.01;  // [s], [m/s], [m]
+  camera.fx = camera.fy = 200.0;
+  camera.noise = {noise, 0.0};
+  for (const int before : {0, 20}) {  // images without it
+    start();
+    step();
+    Eigen::Vector3d centre;
+    for (int n = -before; n < 2; ++n) {
+      scene.balls.resize(1);
+      centre = {0.4, 0.2 - speed * period * n, 0.8};
+      if (n >= 0) {
+        scene.add_sphere(centre, 0.06);
+      }
+      scene.add_arm(arm.robot(), arm.body(), q);
+      look_with_noise(0.05f);
+      time += period;
+      step();
+    }
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int num = 0, elsewhere = 0;
+    for (const Perception::Cell& cell : perception->cells()) {
+      if (!cell.velocity.isZero(0.0)) {
+        const bool is_it = (cell.centre - centre).norm() < 0.12;
+        sum += is_it ? cell.velocity : Eigen::Vector3d(0.0, 0.0, 0.0);
+        (is_it ? num : elsewhere) += 1;
+      }
+    }
+    BOOST_TEST_INFO(before << " images before");
+    BOOST_TEST(num >= 10);  // none before the third image
+    BOOST_TEST((sum / std::max(num, 1) - Eigen::Vector3d(0.0, -speed, 0.0)).norm() < 0.3);
+    BOOST_TEST(elsewhere == 0);
+    const auto set = said("front");  // it comes twice: at rest, too
+    int resting = 0;
+    for (Eigen::Index n = 0; n < set->size(); ++n) {
+      const bool is_it = (set->points().col(n) - centre).norm() < 0.12;
+      resting += is_it && set->velocities().col(n).isZero(0.0) && set->uncertainty()[n] == 0.5 ? 1 : 0;
+    }
+    BOOST_TEST(resting >= num);
+  }
+}
+
+BOOST_FIXTURE_TEST_CASE(what_the_arm_uncovers_between_slow_images_hardly_ever_moves, Watched) {
+  camera.fx = camera.fy = 200.0;
+  camera.noise = {0.01, 0.0};
+  int moving = 0, seen = 0;
+  for (int sweep = 0; sweep < 4; ++sweep) {
+    start();
+    time += 1.0;
+    for (int n = 0; n < 18; ++n) {
+      q = Eigen::Vector4d(-0.8 + 0.1 * n, -0.8, 0.5, 1.1);  // 1 rad/s
+      step();
+      scene = {};
+      scene.add_sphere({-100.4, 0.0, 0.6}, 100.0);
+      for (const double y : {-0.4, -0.25, -0.1, 0.05, 0.2, 0.35, 0.5, 0.65}) {
+        scene.add_sphere({-0.25, y, 0.5}, 0.05);  // alike
+      }
+      scene.add_arm(arm.robot(), arm.body(), q);
+      look_with_noise(0.05f);
+      time += 0.1;
+      for (const Perception::Cell& cell : perception->cells()) {
+        seen += cell.age > 0.0 ? 0 : 1;
+        moving += cell.velocity.norm() < 0.2 || cell.age > 0.0 ? 0 : 1;
+      }
+    }
+  }
+  BOOST_TEST(seen > 10000);
+  BOOST_TEST(moving < 0.003 * seen, moving << " of " << seen);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_moves_goes_on_where_something_hides_it, Watched) {
   constexpr double speed = 0.5, period = 0.1;  // [m/s], [s]
   camera.fx = camera.fy = 200.0;
