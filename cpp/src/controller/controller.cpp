@@ -80,8 +80,8 @@ void Controller::change_sources(const Obstacles& said, Change&& change) {
 void Controller::set_obstacles(Obstacles obstacles, const SourceOptions& options) {
   change_sources(obstacles, [&](SourceRegistry& sources) { sources.set(obstacles, options, now()); });
 }
-void Controller::expect_obstacles(const std::string& source) {
-  change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.expect(source); });
+void Controller::expect_obstacles(const std::vector<std::string>& sources) {
+  change_sources(Obstacles::none(), [&](SourceRegistry& registry) { registry.expect(sources); });
 }
 void Controller::remove_obstacles(const std::string& source) {
   change_sources(Obstacles::none(), [&](SourceRegistry& sources) { sources.remove(source); });

@@ -139,15 +139,19 @@ SourceRegistry::Entry& SourceRegistry::at(const std::string& source) {
                               (names.empty() ? "is none: nothing was set" : "are: " + names));
 }
 
+void SourceRegistry::require_room(const std::string& source, std::size_t number) {
+  if (number > most_sources) {
+    throw std::invalid_argument("obstacles: source " + quoted(source) + " would be number " + std::to_string(number) +
+                                ", allowed: " + std::to_string(most_sources) +
+                                " sources; remove_obstacles(source) forgets one");
+  }
+}
+
 SourceRegistry::Entry& SourceRegistry::at_or_new(const std::string& source) {
   if (Entry* const entry = find(source)) {
     return *entry;
   }
-  if (entries_.size() == most_sources) {
-    throw std::invalid_argument("obstacles: source " + quoted(source) + " would be number " + std::to_string(most_sources + 1) +
-                                ", allowed: " + std::to_string(most_sources) +
-                                " sources; remove_obstacles(source) forgets one");
-  }
+  require_room(source, entries_.size() + 1);
   Entry& entry = entries_.emplace_back();
   entry.set.name = source;
   entry.set.id = ++last_id_;
@@ -202,13 +206,21 @@ void SourceRegistry::set(Obstacles obstacles, const SourceOptions& options, doub
   entry.set.heard_number = ++number_;
 }
 
-void SourceRegistry::expect(const std::string& source) {
-  check({.source = source});
-  if (find(source) == nullptr) {
-    Entry& entry = at_or_new(source);
-    entry.set.time = entry.set.heard = SourceSet::not_come;
-    entry.set.valid_for = settings_.sources.valid_for;
-    entry.set.number = entry.set.heard_number = ++number_;
+void SourceRegistry::expect(const std::vector<std::string>& sources) {
+  std::size_t number = entries_.size();
+  for (const std::string& source : sources) {
+    check({.source = source});
+    if (find(source) == nullptr) {
+      require_room(source, ++number);
+    }
+  }
+  for (const std::string& source : sources) {
+    if (find(source) == nullptr) {
+      Entry& entry = at_or_new(source);
+      entry.set.time = entry.set.heard = SourceSet::not_come;
+      entry.set.valid_for = settings_.sources.valid_for;
+      entry.set.number = entry.set.heard_number = ++number_;
+    }
   }
 }
 

@@ -24,8 +24,8 @@ class SourceRegistry {
 
   /// Replaces what a source said. An empty set after one with points is not believed at once, see SourceSettings::empty_after.
   void set(Obstacles obstacles, const SourceOptions& options, double now);
-  /// Tells that a source will come: it is overdue until it is set. One that is there stays as it is.
-  void expect(const std::string& source);
+  /// Tells that sources will come: each is overdue until it is set. One that is there stays as it is.
+  void expect(const std::vector<std::string>& sources);
   /// Forgets a source.
   void remove(const std::string& source);
   /// Adds named groups that a source does not have, or that are its first.
@@ -54,6 +54,8 @@ class SourceRegistry {
   Entry* find(const std::string& source) noexcept;
   Entry& at(const std::string& source);
   Entry& at_or_new(const std::string& source);
+  /// Throws where a source that is not there would be beyond the most that there can be.
+  static void require_room(const std::string& source, std::size_t number);
   /// Notes that a source was set at a time [s].
   void note(Entry& entry, double time) const noexcept;
   /// Finds velocities that nobody told from the points before, which were set at `last` [s]. `has_time`: they were given their time.

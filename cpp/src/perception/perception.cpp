@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
@@ -64,9 +65,9 @@ Perception::Perception(Controller& controller, std::vector<DepthCamera> cameras,
     }
   }
   impl_ = std::make_unique<Impl>(controller, cameras_, settings_);
-  for (const DepthCamera& camera : cameras_) {
-    controller.expect_obstacles(camera.name);
-  }
+  std::vector<std::string> names;
+  std::transform(cameras_.begin(), cameras_.end(), std::back_inserter(names), [](const DepthCamera& its) { return its.name; });
+  controller.expect_obstacles(names);
 }
 Perception::~Perception() = default;
 

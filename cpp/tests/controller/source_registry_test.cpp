@@ -171,6 +171,14 @@ BOOST_AUTO_TEST_CASE(what_is_refused_says_what_is_allowed_and_changes_nothing) {
   BOOST_TEST(r.world().number == before);
   BOOST_TEST(r.world().obstacles.size() == 2);
   for (std::size_t k = 1; k < most_sources; ++k) {
+    if (k + 1 == most_sources) {
+      const std::uint64_t number = r.world().number;
+      BOOST_TEST(error_of([&] { all.expect({"left", "right"}); }).find("source 'right' would be number 33") !=
+                 std::string::npos);
+      BOOST_TEST(r.world().number == number);
+      BOOST_TEST(r.world().sources.size() == k);  // none of them is expected
+      all.expect({"s1", "s2"});                   // they are there
+    }
     all.set(one_ball(1.0), {.source = "s" + std::to_string(k)}, 0.0);
   }
   BOOST_TEST(error_of([&] { all.set(one_ball(1.0), {.source = "more"}, 0.0); }).find("allowed: 32 sources") !=

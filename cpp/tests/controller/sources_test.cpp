@@ -68,7 +68,7 @@ BOOST_AUTO_TEST_CASE(nothing_is_known_to_be_free_until_somebody_says_so) {
 
 BOOST_AUTO_TEST_CASE(a_source_that_is_expected_is_overdue_until_it_comes) {
   Seeing seen;
-  seen.registry.expect("left");
+  seen.registry.expect({"left"});
   seen.set(test::ball(far_place, 0.1), {.source = "right", .time = 0.0});
   BOOST_TEST(seen.registry.said().size() == 1u);
   seen.update(0.1);
@@ -77,12 +77,12 @@ BOOST_AUTO_TEST_CASE(a_source_that_is_expected_is_overdue_until_it_comes) {
   BOOST_TEST(seen.sources.states().at(0).age == test::infinity);
   BOOST_TEST(seen.sources.explain().find("source 'left' was expected and has not come yet") != std::string::npos);
   seen.set(test::ball(far_place, 0.2), {.source = "left", .time = 0.1});
-  seen.registry.expect("left");  // it has come
+  seen.registry.expect({"left"});  // it has come
   seen.put();
   seen.update(0.1);
   BOOST_TEST(!seen.sources.is_stale());
   BOOST_TEST(seen.sources.obstacles().size() == 2);
-  seen.registry.expect("front");
+  seen.registry.expect({"front"});
   seen.put();
   seen.update(0.01);
   BOOST_TEST(seen.sources.is_stale());
@@ -90,7 +90,7 @@ BOOST_AUTO_TEST_CASE(a_source_that_is_expected_is_overdue_until_it_comes) {
   seen.put();
   seen.update(0.01);
   BOOST_TEST(!seen.sources.is_stale());
-  seen.registry.expect("table");
+  seen.registry.expect({"table"});
   seen.registry.add(test::ball(far_place, 0.1).named({"box"}, {1}), "table");
   seen.put();
   seen.update(10.0);  // the others are too old then
@@ -102,7 +102,7 @@ BOOST_AUTO_TEST_CASE(an_expected_source_is_overdue_where_all_others_are_believed
   settings.sources.valid_for = test::infinity;
   Seeing seen(settings);
   seen.set(Obstacles::none());
-  seen.registry.expect("side");
+  seen.registry.expect({"side"});
   seen.put();
   seen.update();
   BOOST_TEST(seen.sources.is_stale());

@@ -137,7 +137,9 @@ class Controller {
   /// set after one with points is believed once it has been empty for SourceSettings::empty_after.
   void set_obstacles(Obstacles obstacles, const SourceOptions& options = {});
   /// Tells that a source will come: the arm stays where it is until it has said something. A source that has, stays as it is.
-  void expect_obstacles(const std::string& source);
+  void expect_obstacles(const std::string& source) { expect_obstacles(std::vector{source}); }
+  /// The same of several, all or none.
+  void expect_obstacles(const std::vector<std::string>& sources);
   /// Forgets a source, at once; also one that was expected.
   void remove_obstacles(const std::string& source);
   /// Adds named points to a source, see Obstacles::named. Throws also where it has something of that name.
