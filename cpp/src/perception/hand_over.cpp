@@ -162,6 +162,7 @@ void Perception::Impl::find_velocities(View& view, double time) {
   view.movers.clear();
   const auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
   const Sight sight = [sees](const Eigen::Vector3d& place) { return sees->shows(place); };
+  const bool is_first = time <= view.begin;
   for (const int index : shown) {
     const auto n = static_cast<std::size_t>(index);
     velocities[n].setZero();
@@ -169,13 +170,13 @@ void Perception::Impl::find_velocities(View& view, double time) {
     map.set_moves(index, false);
     const Voxel& voxel = map.voxels()[n];
     // What the first image shows may rest, and is known to once others have shown it; what moves comes to other cells.
-    if (voxel.first <= view.begin || time <= view.begin) {
+    if (is_first || voxel.first <= view.begin) {
       uncertainties[n] = view.stands_still && VoxelMap::may_move(voxel) ? static_cast<float>(unsure_speed) : 0.0f;
     } else if (!map.is_settled(voxel, view.X_WC.translation(), view.camera.noise)) {
       fresh.push_back(index);
     }
   }
-  if (time <= view.begin) {
+  if (is_first) {
     view.motion.begin(balls(shown, true), time, sight);
     return;
   }

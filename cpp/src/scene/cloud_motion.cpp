@@ -38,9 +38,10 @@ constexpr double long_wait = 0.05;        // Spacing from which on two sets alon
 constexpr double longest_jump = 0.25;     // up to which they can [s],
 constexpr std::size_t least_jumping = 8;  // of so many points at least,
 constexpr double least_jump = 0.03;       // whose displacement is larger than this [m],
-constexpr double surely_jumped = 6.0;     // and than so many standard deviations.
-constexpr double jump_slip = 0.5;         // Its relative error: what is seen of a thing changes as it goes [-].
-constexpr std::size_t stray_points = 3;   // Number of points of a cluster that can be noise of the background, at most.
+constexpr double surely_jumped = 6.0;     // and than so many standard deviations,
+constexpr double seen_before = 2.0 / 3.0;  // where the last set would have shown so large a share of them.
+constexpr double jump_slip = 0.5;          // Its relative error: what is seen of a thing changes as it goes [-].
+constexpr std::size_t stray_points = 3;    // Number of points of a cluster that can be noise of the background, at most.
 
 const Sight everywhere;
 
@@ -58,17 +59,15 @@ void CloudMotion::forget() {
   sets_.clear();
   memory_.forget();
   noise_ = 0.0;
-  is_first_look_ = false;
 }
 
 void CloudMotion::begin(const Eigen::Matrix3Xd& points, double time, Sight sight) {
   forget();
   const auto num = static_cast<std::size_t>(points.cols());
-  Set set{
-      time, points, PointGrid(points), std::move(sight), {}, std::vector<PointMotion>(num, {.uncertainty = largest_speed_})};
+  Set set{time, points, PointGrid(points), std::move(sight), {}, {}, true};
+  set.motions.resize(num, {.uncertainty = largest_speed_});
   add_clusters(set, std::vector<char>(num, 0), std::vector<char>(num, 1));
   sets_.push_front(std::move(set));
-  is_first_look_ = true;
 }
 
 bool CloudMotion::is_repeated(const Eigen::Matrix3Xd& points, double time) const {
@@ -106,7 +105,7 @@ std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, dou
   learn_noise(set);
   split(set);
   spread_out(set, rests);
-  if (std::exchange(is_first_look_, false)) {
+  if (!sets_.empty() && sets_[0].is_first_look) {
     sets_.clear();
   }
   sets_.push_front(std::move(set));
@@ -397,11 +396,9 @@ bool CloudMotion::has_jumped(const Cluster& cluster, double way, double error, d
       way <= std::max(least_jump, surely_jumped * std::max(error, noise_))) {
     return false;
   }
-  Eigen::Index num = 0;
-  for (Eigen::Index n = 0; n < cluster.sample.cols(); ++n) {
-    num += sight(cluster.sample.col(n)) ? 1 : 0;
-  }
-  return 3 * num >= 2 * cluster.sample.cols();  // else it may have been there, and hidden
+  const auto places = cluster.sample.colwise();
+  const auto num = static_cast<double>(std::count_if(places.begin(), places.end(), sight));
+  return num >= seen_before * static_cast<double>(cluster.sample.cols());  // else it may have been there, and hidden
 }
 
 void CloudMotion::follow_jump(Cluster& cluster, const Eigen::Vector3d& shift, double error, double time) const {

@@ -27,7 +27,7 @@ class CloudMotion {
 
   /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last. sight: see VelocityEstimate.
   std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time, Sight sight);
-  /// Forgets all; a first look, see VelocityEstimate.
+  /// Forgets all, and takes a first look, see VelocityEstimate.
   void begin(const Eigen::Matrix3Xd& points, double time, Sight sight);
   void forget();
 
@@ -47,6 +47,7 @@ class CloudMotion {
     Sight sight;
     std::vector<Cluster> clusters;
     std::vector<PointMotion> motions;
+    bool is_first_look = false;  // Only the next set is compared with it.
   };
   /// Where a cluster lay in the last set; whether it moved there.
   struct Match {
@@ -84,7 +85,7 @@ class CloudMotion {
   Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead, bool has_moved) const;
   Match match(const Cluster& cluster, const Set& now, bool among_few) const;
   void follow_line(Cluster& cluster, const Match& match, const Set& now) const;
-  /// Whether the last set alone tells that a cluster moved by a way, with an error [m]: it is large, and that set would have shown it here.
+  /// Whether the last set alone tells that a cluster moved, by a way with an error [m], in a duration [s].
   bool has_jumped(const Cluster& cluster, double way, double error, double duration) const;
   /// What the last set alone tells of a cluster that lay in it at a shift [m], with an error [m].
   void follow_jump(Cluster& cluster, const Eigen::Vector3d& shift, double error, double time) const;
@@ -94,8 +95,7 @@ class CloudMotion {
   double largest_speed_;
   std::deque<Set> sets_;  // the newest first
   RestMemory memory_;
-  double noise_ = 0.0;          // of the places of clusters from set to set [m]: sensors that shake
-  bool is_first_look_ = false;  // The last set is one.
+  double noise_ = 0.0;  // of the places of clusters from set to set [m]: sensors that shake
 };
 
 }  // namespace sidestep

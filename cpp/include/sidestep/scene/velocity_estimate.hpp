@@ -21,9 +21,9 @@ using Sight = std::function<bool(const Eigen::Vector3d& place)>;
 ///     clusters, and each is registered against up to five earlier sets: a trimmed nearest-neighbour translation. A line through
 ///     the displacements is the velocity if an F test says that it is no noise; else the cluster rests. From the third set on.
 ///
-/// Where a sensor's sight is told and a third set comes late, as from 0.05 s between sets on and up to 0.25 s, a cluster that only the last
-/// set has moves from the second on: if it has 8 points or more, went farther than 3 cm and 6 standard deviations, and most of its
-/// places were in the sight of the last set. Its number of sets is 2, and half of its velocity is uncertain.
+/// Where sets are 0.05 to 0.25 s apart, a third one comes late. If the sensor's sight is told, two are enough for a cluster that only the
+/// last set has, too: it moves if it has 8 points or more, went farther than 3 cm and 6 standard deviations, and the last set would have
+/// shown most of it where it is now. Such a velocity has `sets` = 2, and an uncertainty of half of it or more.
 ///
 /// Something whose displacement exceeds the largest speed was put elsewhere: it is new. The same points again say nothing new for up to
 /// one and a half spacings of the sets; after that they rest.
@@ -62,8 +62,8 @@ class VelocityEstimate {
   /// sight: of the sensor at that time; kept while the set is compared. Throws std::invalid_argument if the time is not finite.
   Result update(const Obstacles& now, double time, Sight sight = {});
 
-  /// A first look: a set of which most rests, and is not in later ones. The next set is compared with it, those after that are not: what
-  /// later ones lack of it would bend a line. All of its points are a cloud. Forgets all before. Throws as `update`.
+  /// Forgets all, and takes a first look: points of which most rest, and which later sets leave out. Only the next set is compared with
+  /// it: lines through later ones would bend, since they lack points of it. Names and velocities do not count. Throws as `update`.
   void begin(const Obstacles& first, double time, Sight sight = {});
 
   /// The next set is the first.
