@@ -309,6 +309,25 @@ BOOST_FIXTURE_TEST_CASE(what_the_first_image_of_a_fixed_camera_shows_may_move, W
   }
 }
 
+BOOST_FIXTURE_TEST_CASE(a_first_image_that_comes_after_a_newer_one_of_another_camera_may_show_what_moves, Watched) {
+  camera.fx = camera.fy = 200.0;
+  DepthCamera beside = camera;
+  beside.name = "beside";
+  perception = std::make_unique<Perception>(controller, std::vector{camera, beside}, settings);
+  const std::vector<float> pixels = scene.image(camera);
+  const auto update = [&](const std::string& name, double captured) {
+    perception->update(name, RawDepth{std::span<const float>(pixels), 1.0}, Capture{captured, {}, std::nullopt});
+  };
+  for (int n = 0; n < 4; ++n, time += 0.03) {
+    step();
+  }
+  update("beside", 10.06);
+  update("front", 10.03);  // its cells were shown before, and later
+  const auto set = said("front");
+  BOOST_TEST(set->size() > 30);
+  BOOST_TEST((set->uncertainty().array() == 0.5).all());
+}
+
 BOOST_FIXTURE_TEST_CASE(two_slow_images_tell_that_something_moves, Watched) {
   constexpr double period = 0.1, speed = 0.6, noise = 0.01;  // [s], [m/s], [m]
   camera.fx = camera.fy = 200.0;
