@@ -38,17 +38,22 @@ def test_a_box_that_is_behind_its_time_hears() -> None:
     address = ADDRESS.rpartition(".")[0] + ".254"
     box = Box(Arm.load("ur5"), np.zeros(6), period=0.002, unlock_after=5.0, log=print)
     reader, writer = os.pipe()  # the end of what is watched
-    slow = {"address": address, "on_tick": lambda: time.sleep(2.0 * box.period)}
-    with Server(box, model="UR5", version=(5, 12, 0, 0), **slow) as server:  # type: ignore[arg-type]
+    behind = threading.Event()
+
+    def tick() -> None:
+        time.sleep(2.0 * box.period)
+        behind.set()
+
+    with Server(box, address=address, model="UR5", version=(5, 12, 0, 0), on_tick=tick) as server:
         server.watched[reader] = lambda: False
         thread = threading.Thread(target=server.serve, daemon=True)
         thread.start()
+        assert behind.wait(10.0)
         with socket.create_connection((address, DASHBOARD), timeout=10.0) as client:
             assert client.recv(100) == b"Connected: Universal Robots Dashboard Server\n"
         os.write(writer, b"x")
         thread.join(10.0)
         assert not thread.is_alive()
-    assert box.time > 0.0
     for end in (reader, writer):
         os.close(end)
 
