@@ -150,6 +150,13 @@ void bind_client_obstacles(nb::class_<Client>& c) {
            },
            nb::arg("source") = SourceOptions::scene, nb::sig("def remove_obstacles(self, source: str = 'scene') -> None"),
            "As Controller.remove_obstacles. With the token.")
+      .def("expect_obstacles", [](Client& self, nb::handle source) {
+             const std::string name = as_text(source, "source", "the name of a source");
+             const nb::gil_scoped_release others;
+             self.expect_obstacles(name);
+           },
+           nb::arg("source"), nb::sig("def expect_obstacles(self, source: str) -> None"),
+           "As Controller.expect_obstacles. With the token.")
       .def("update", [](Client& self, const std::string& camera, nb::handle depth, nb::handle time, nb::handle unit, nb::handle pose) {
              const DepthPixels pixels = as_depth_pixels(depth, unit);
              const double when = as_seconds(time, "time");

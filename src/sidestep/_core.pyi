@@ -5123,6 +5123,9 @@ class Client:
     def remove_obstacles(self, source: str = 'scene') -> None:
         """As Controller.remove_obstacles. With the token."""
 
+    def expect_obstacles(self, source: str) -> None:
+        """As Controller.expect_obstacles. With the token."""
+
     def update(self, camera: str, depth: numpy.typing.ArrayLike, *, time: float, unit: float | None = None, pose: numpy.typing.ArrayLike | None = None) -> None:
         """
         An image of one of the server's cameras, as Perception.update. With the token. The server works on it after it has answered;

@@ -79,6 +79,9 @@ def test_all_requests_reach_the_controller(served: Served) -> None:
         client.move_obstacle("ball", np.eye(4), "tracker", valid_for=np.inf)
         client.remove_obstacle("other", "tracker")
         client.remove_obstacles("tracker")
+        client.expect_obstacles("side")
+        assert client.wait(lambda state: "'side' was expected and has not come yet" in client.explain(), timeout=10.0)
+        client.remove_obstacles("side")
         client.stop_run("a test")
         assert served.server.take_stop() == f"{served.server.clients[0].name} asked for it: a test"
 
@@ -92,6 +95,8 @@ def test_refusals_are_value_errors_in_the_controllers_words(served: Served) -> N
             client.set_goal([100.0, 0.0, 0.0])
         with pytest.raises(ValueError, match="there is no source 'nobody'"):
             client.remove_obstacles("nobody")
+        with pytest.raises(ValueError, match="source"):
+            client.expect_obstacles("")
         with pytest.raises(TypeError, match="until is 3"):
             client.wait(3)  # type: ignore[arg-type]
         with pytest.warns(RuntimeWarning, match="rad/s"):

@@ -53,6 +53,7 @@ std::string Client::move_obstacle(const std::string& name, const Eigen::Isometry
 }
 void Client::remove_obstacle(const std::string& name, const std::string& source) { impl_->ask(RemoveObstacle{name, source}); }
 void Client::remove_obstacles(const std::string& source) { impl_->ask(RemoveObstacles{source}); }
+void Client::expect_obstacles(const std::string& source) { impl_->ask(ExpectObstacles{source}); }
 
 void Client::update(const std::string& camera, int width, int height, const RawDepth& depth, double time,
                     const Eigen::Isometry3d* pose) {

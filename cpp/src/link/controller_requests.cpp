@@ -93,6 +93,11 @@ std::string apply(Controller& controller, const RemoveObstacles& request) {
   return {};
 }
 
+std::string apply(Controller& controller, const ExpectObstacles& request) {
+  controller.expect_obstacles(request.source);
+  return {};
+}
+
 SetPoseGoal pose_request(const PoseGoal& goal) {
   SetPoseGoal request{{pose_target_of(goal)}};
   for (const PoseGoal& other : goal.others) {

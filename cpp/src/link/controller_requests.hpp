@@ -22,6 +22,7 @@ std::string apply(Controller& controller, const AddObstacle& request);
 std::string apply(Controller& controller, const MoveObstacle& request);
 std::string apply(Controller& controller, const RemoveObstacle& request);
 std::string apply(Controller& controller, const RemoveObstacles& request);
+std::string apply(Controller& controller, const ExpectObstacles& request);
 
 /// The message that asks for a goal.
 SetPoseGoal pose_request(const PoseGoal& goal);

@@ -40,6 +40,7 @@ void each_message(auto&& visit) {
   visit(StopRun{});
   visit(Explain{});
   visit(Ping{});
+  visit(ExpectObstacles{});
   visit(Welcome{});
   visit(Done{});
   visit(Refused{});

@@ -76,6 +76,8 @@ void RemoveObstacle::check() const {
 
 void RemoveObstacles::check() const { require_text("source", source); }
 
+void ExpectObstacles::check() const { require_text("source", source); }
+
 void DepthImageMessage::check() const {
   require_text("camera", camera);
   if (pixel != Pixel::uint16 && pixel != Pixel::float32) {

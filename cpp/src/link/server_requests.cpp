@@ -106,6 +106,7 @@ void Server::Impl::dispatch(Session& session, const RawMessage& raw) {
     case MessageType::move_obstacle: carry_out<MoveObstacle>(session, raw); break;
     case MessageType::remove_obstacle: carry_out<RemoveObstacle>(session, raw); break;
     case MessageType::remove_obstacles: carry_out<RemoveObstacles>(session, raw); break;
+    case MessageType::expect_obstacles: carry_out<ExpectObstacles>(session, raw); break;
     case MessageType::depth_image: carry_out<DepthImageMessage>(session, raw); break;
     case MessageType::pause: carry_out<Pause>(session, raw); break;
     case MessageType::resume: carry_out<Resume>(session, raw); break;

@@ -208,6 +208,7 @@ BOOST_AUTO_TEST_CASE(refusals_are_the_controllers_words) {
              std::invalid_argument, "nan");
   CHECK_SAYS(client.set_twist("hand", Vector6d::Zero()), std::invalid_argument, "tip");
   CHECK_SAYS(client.remove_obstacles("camera"), std::invalid_argument, "scene");
+  CHECK_SAYS(client.expect_obstacles(""), std::invalid_argument, "source");
   const std::vector<std::uint16_t> pixels(4, 1000);
   CHECK_SAYS(client.update("front", 2, 2, {std::span(pixels)}, 0.0), std::invalid_argument, "this server has no cameras");
   BOOST_TEST(!client.set_velocity(Eigen::VectorXd::Constant(nv, 60.0)).empty());  // followed, but hard to believe

@@ -83,6 +83,7 @@ class Client {
   std::string move_obstacle(const std::string& name, const Eigen::Isometry3d& pose, const SourceOptions& options = {});
   void remove_obstacle(const std::string& name, const std::string& source = SourceOptions::scene);
   void remove_obstacles(const std::string& source);
+  void expect_obstacles(const std::string& source);
   /// An image of a camera of the server, see Perception::update. It is worked on after the answer; see `notices`.
   void update(const std::string& camera, int width, int height, const RawDepth& depth, double time,
               const Eigen::Isometry3d* pose = nullptr);

@@ -61,6 +61,7 @@ enum class MessageType : std::uint16_t {
   stop_run = 35,
   explain = 36,
   ping = 37,
+  expect_obstacles = 38,
   // Server to client.
   welcome = 64,
   done = 65,

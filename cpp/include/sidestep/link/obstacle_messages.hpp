@@ -103,6 +103,15 @@ struct RemoveObstacles {
 };
 void each_field(Of<RemoveObstacles> auto& m, auto&& visit) { visit("source", m.source, "name"); }
 
+struct ExpectObstacles {
+  static constexpr MessageInfo info{MessageType::expect_obstacles, "ExpectObstacles", Sender::client, 8192,
+                                    "As Controller.expect_obstacles. With the token."};
+  std::string source;
+
+  void check() const;
+};
+void each_field(Of<ExpectObstacles> auto& m, auto&& visit) { visit("source", m.source, "name"); }
+
 struct DepthImageMessage {
   static constexpr MessageInfo info{MessageType::depth_image, "DepthImageMessage", Sender::client, 32 << 20,
                                     "As Perception.update, where the server has a perception. With the token."};
