@@ -158,7 +158,7 @@ Obstacles Perception::Impl::balls(const std::vector<int>& chosen, bool moved) co
 
 void Perception::Impl::find_velocities(View& view, double time) {
   fresh.clear();
-  jumped.clear();
+  doubtful.clear();
   view.movers.clear();
   const auto sees = std::make_shared<const ImageSight>(view.camera, view.X_WC, view.image, view.mask.front());
   const Sight sight = [sees](const Eigen::Vector3d& place) { return sees->shows(place); };
@@ -185,7 +185,11 @@ void Perception::Impl::find_velocities(View& view, double time) {
     return;
   }
   const Obstacles candidates = balls(fresh, true);
-  const VelocityEstimate::Result found = view.motion.update(candidates, time, sight);
+  // Where the camera moves, the border of its image uncovers things, and their middles move with it.
+  const Eigen::VectorXd noise = Eigen::VectorXd::NullaryExpr(candidates.size(), [&](Eigen::Index n) {
+    return view.stands_still ? view.camera.noise.sigma((candidates.points().col(n) - view.X_WC.translation()).norm()) : 0.0;
+  });
+  const VelocityEstimate::Result found = view.motion.update(candidates, time, sight, noise);
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];
@@ -206,8 +210,8 @@ void Perception::Impl::find_velocities(View& view, double time) {
       velocities[at] = found.velocities.col(n).cast<float>();
       uncertainties[at] = static_cast<float>(found.uncertainty[n]);
       map.set_moves(index, true);
-      if (found.sets[n] == 2) {
-        jumped.push_back(index);
+      if (found.sets[n] == 2 || noise[n] > VelocityEstimate::noisy) {
+        doubtful.push_back(index);
       }
     } else if (view.stands_still && !map.is_beside_rest(map.voxels()[at])) {
       // A velocity that is not believed is not known to be zero either.
@@ -243,7 +247,7 @@ Obstacles Perception::Impl::moving_balls(const SeenImage& seen) {
     const auto n = static_cast<std::size_t>(index);
     handed.push_back({index, velocities[n].cast<double>(), static_cast<double>(uncertainties[n]), 0.0});
   }
-  for (const int index : jumped) {  // two images can be wrong
+  for (const int index : doubtful) {
     handed.push_back({index, Eigen::Vector3d::Zero(), unsure_speed, 0.0});
   }
   for (const int index : fresh) {

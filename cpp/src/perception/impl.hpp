@@ -95,7 +95,8 @@ struct Perception::Impl {
   /// What another camera than one sees moving near a point at a time [s]; null: nothing.
   const Mover* mover_beside(std::size_t number, const Eigen::Vector3d& point, double time) const;
   /// What a camera shows, with velocities, and what it showed before where that moved or may move and is hidden. What two images
-  /// alone tell to move comes twice, also at rest; so does what it cannot tell to move beside what another camera sees moving.
+  /// alone or points with much noise tell to move comes twice, also at rest; so does what it cannot tell to move beside what another
+  /// camera sees moving.
   Obstacles moving_balls(const SeenImage& seen);
   /// Takes what other sources say, where it was at a time [s].
   void find_told(double time);
@@ -122,7 +123,7 @@ struct Perception::Impl {
   std::uint64_t told_version = 0;                      // Sum of their versions.
   std::vector<Tested> tested;                          // one per voxel
   std::vector<int> fresh;                              // Voxels that a camera shows and that may move, in work.
-  std::vector<int> jumped;                             // Those of them that two images alone tell to move, in work.
+  std::vector<int> doubtful;                           // Those of them whose motion may be none, in work.
   std::vector<int> shown, remembered;                  // Voxels that a camera shows, and that none shows, in work.
   std::vector<Handed> handed;                          // What a camera shows and has just shown, in work.
   std::vector<int> last_remembered;                    // The latter, as the controller has them.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "../math/settings.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -64,7 +66,7 @@ void CloudMotion::forget() {
 void CloudMotion::begin(const Eigen::Matrix3Xd& points, double time, Sight sight) {
   forget();
   const auto num = static_cast<std::size_t>(points.cols());
-  Set set{time, points, PointGrid(points), std::move(sight), {}, {}, true};
+  Set set{time, points, PointGrid(points), Eigen::VectorXd::Zero(points.cols()), std::move(sight), {}, {}, true};
   set.motions.resize(num, {.uncertainty = largest_speed_});
   add_clusters(set, std::vector<char>(num, 0), std::vector<char>(num, 1));
   sets_.push_front(std::move(set));
@@ -79,7 +81,8 @@ bool CloudMotion::is_repeated(const Eigen::Matrix3Xd& points, double time) const
   return time - sets_[0].time <= (any ? held * (sets_[0].time - sets_[1].time) : least_spacing);
 }
 
-std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, double time, Sight sight) {
+std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, double time, Sight sight,
+                                             const Eigen::VectorXd& noise) {
   if (!sets_.empty() && time - sets_[0].time > longest_pause) {
     sets_.clear();
   }
@@ -96,7 +99,7 @@ std::vector<PointMotion> CloudMotion::update(const Eigen::Matrix3Xd& points, dou
     is_new[n] = rests[n].age < rested_age || rests[n].sets < rested_sets;
     is_old[n] = is_background(rests[n]);
   }
-  Set set{time, points, PointGrid(points), std::move(sight), {}, {}};
+  Set set{time, points, PointGrid(points), noise, std::move(sight), {}, {}};
   add_clusters(set, is_old, is_new);
   const bool few = set.clusters.size() <= few_clusters && (sets_.empty() || sets_[0].clusters.size() <= few_clusters);
   for (Cluster& cluster : set.clusters) {
@@ -133,6 +136,7 @@ void CloudMotion::add_cluster(Set& set, std::vector<int> points) {
   const auto count = static_cast<Eigen::Index>(cluster.points.size());
   const Eigen::Matrix3Xd all = set.points(Eigen::all, cluster.points);
   cluster.middle = all.rowwise().mean();
+  cluster.noise = set.noise(cluster.points).mean();
   cluster.size = all.rowwise().maxCoeff() - all.rowwise().minCoeff();
   const Eigen::Index kept = std::min(count, sample_size);
   cluster.sample.resize(3, kept);
@@ -172,14 +176,23 @@ void CloudMotion::split(Set& set) const {
 void CloudMotion::judge(Cluster& cluster, const Set& set, bool among_few) const {
   const double time = set.time;
   cluster.motion = {.uncertainty = largest_speed_};
-  if (sets_.empty() || is_stray(cluster) || rests(cluster, time)) {
+  if (sets_.empty() || is_stray(cluster)) {
+    return;
+  }
+  if (among_few && is_noisy(cluster)) {
+    if (const Track track = track_middle(cluster, set); track.num > 2) {
+      follow(cluster, track, time);
+      return;
+    }
+  }
+  if (rests(cluster, time)) {
     return;
   }
   const Match found = match(cluster, set, among_few);
   const Registration& last = found.registration;
   const double most = largest_speed_ * (time - sets_[0].time) + sure * std::max(last.error, least_error);
   if (last.is_known() && last.shift.norm() <= most) {
-    follow_line(cluster, found, set);
+    follow(cluster, track_points(cluster, found, set), time);
   } else {
     flickers(cluster, time);
   }
@@ -235,7 +248,8 @@ bool CloudMotion::is_stray(Cluster& cluster) const {
 }
 
 CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, const Cluster& other, const Set& then) const {
-  Way way{.shift = other.middle - cluster.middle};
+  Way way{.shift = other.middle - cluster.middle,
+          .num = static_cast<int>(std::min(cluster.points.size(), other.points.size()))};
   if (!now.sight || !then.sight || cluster.sample.cols() < few_in_sight || other.sample.cols() < few_in_sight) {
     return way;
   }
@@ -275,6 +289,7 @@ CloudMotion::Way CloudMotion::way_back(const Cluster& cluster, const Set& now, c
       return way;
     }
     shift = there / num_there - here / num_here;
+    way.num = std::min(num_here, num_there);
   }
   if (way.is_cut && shift.norm() <= largest_speed_ * (now.time - then.time)) {
     way.shift = shift;
@@ -342,47 +357,102 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bo
   return best;
 }
 
-void CloudMotion::follow_line(Cluster& cluster, const Match& match, const Set& now) const {
-  const double time = now.time;
-  LineFit<3>::Positions positions = LineFit<3>::Positions::Zero();
-  std::array<double, most_sets> times{};
-  positions.col(1) = match.registration.shift;
-  times[1] = sets_[0].time - time;
-  double error = std::max(match.registration.error, least_error);
-  int num = 2;
-  for (std::size_t k = 1; k < sets_.size() && time - sets_[k].time <= longest_history; ++k, ++num) {
-    times[k + 1] = sets_[k].time - time;
-    const auto at = static_cast<Eigen::Index>(k);
-    const Eigen::Vector3d ahead = LineFit<3>(positions, times, num).at(times[k + 1]);
-    const Starts starts = starts_in(cluster, now, sets_[k], ahead, match.moved);
+void CloudMotion::Track::add(const Eigen::Vector3d& shift, double time, double shift_error) {
+  shifts.col(num) = shift;
+  times[static_cast<std::size_t>(num)] = time;
+  error = std::max(error, shift_error);
+  ++num;
+}
+
+CloudMotion::Track CloudMotion::track_points(const Cluster& cluster, const Match& match, const Set& now) const {
+  Track track{.error = least_error, .has_moved = match.moved};
+  track.add(match.registration.shift, sets_[0].time - now.time, match.registration.error);
+  for (std::size_t k = 1; k < sets_.size() && now.time - sets_[k].time <= longest_history; ++k) {
+    const double time = sets_[k].time - now.time;
+    const Starts starts = starts_in(cluster, now, sets_[k], track.at(time), match.moved);
     const Sight& sight = starts.is_cut ? sets_[k].sight : everywhere;
     const Registration then = register_points(cluster.sample, sets_[k].grid, starts.shifts, 3, sight);
     if (!then.is_known()) {
       break;
     }
-    positions.col(at + 1) = then.shift;
-    error = std::max(error, then.error);
+    track.add(then.shift, time, then.error);
   }
+  return track;
+}
+
+bool CloudMotion::is_noisy(const Cluster& cluster) noexcept {
+  return cluster.noise > VelocityEstimate::noisy && cluster.points.size() > stray_points;
+}
+
+const CloudMotion::Cluster* CloudMotion::same_in(const Set& then, const Cluster& cluster, const Set& now,
+                                                 std::optional<Eigen::Vector3d> expected) const {
+  const double duration = now.time - then.time, noise = sure * cluster.noise;
+  const auto is_alike = [&](const Cluster& other) {
+    const std::size_t more = std::max(other.points.size(), cluster.points.size()),
+                      less = std::min(other.points.size(), cluster.points.size());
+    return more <= 4 * less && (other.size - cluster.size).norm() <=
+                                   0.5 * std::max(other.size.norm(), cluster.size.norm()) + PointGrid::edge + cluster.noise;
+  };
+  const Cluster* nearest = nullptr;
+  double least = expected ? PointGrid::edge + noise : infinity;
+  for (const Cluster& other : then.clusters) {
+    const Eigen::Vector3d way = other.middle - cluster.middle;
+    const double off = (way - expected.value_or(-duration * other.motion.velocity)).norm();
+    if (off < least && way.norm() <= largest_speed_ * duration + noise && is_alike(other)) {
+      nearest = &other;
+      least = off;
+    }
+  }
+  if (nearest == nullptr || expected || least <= 0.5 * nearest->size.norm()) {
+    return nearest;
+  }
+  const Eigen::Vector3d place = nearest->middle + duration * nearest->motion.velocity;
+  const auto is_nearer = [&](const Cluster& other) { return (other.middle - place).norm() < least && is_alike(other); };
+  return std::any_of(now.clusters.begin(), now.clusters.end(), is_nearer) ? nullptr : nearest;
+}
+
+CloudMotion::Track CloudMotion::track_middle(const Cluster& cluster, const Set& now) const {
+  Track track{.error = least_error};
+  for (const Set& then : sets_) {
+    const double duration = now.time - then.time;
+    if (duration > longest_history) {
+      break;
+    }
+    const bool is_newest = track.num == 1;
+    const Cluster* const other = same_in(then, cluster, now, is_newest ? std::nullopt : std::optional(track.at(-duration)));
+    const Way way = other == nullptr ? Way() : way_back(cluster, now, *other, then);
+    if (way.shift) {
+      track.has_moved = track.has_moved || (is_newest && other->motion.sets > 2 && !other->motion.velocity.isZero(0.0));
+      track.add(*way.shift, -duration, cluster.noise / std::sqrt(static_cast<double>(way.num)));
+    } else if (is_newest) {
+      break;  // it has appeared
+    }
+  }
+  return track;
+}
+
+void CloudMotion::follow(Cluster& cluster, const Track& track, double time) const {
+  const auto& [shifts, times, num, error, has_moved] = track;
   if (num == 2) {
-    follow_jump(cluster, match.registration.shift, error, time);
+    follow_jump(cluster, shifts.col(1), error, time);
     return;
   }
-  const LineFit<3> newest(positions, times, 3);
+  const LineFit<3> newest(shifts, times, 3);
   int used = num;
   LineFit<3> line = newest;
   for (; used > 3; --used) {
-    line = LineFit<3>(positions, times, used);
+    line = LineFit<3>(shifts, times, used);
     if (line.scatter <= same_scatter * std::max(newest.scatter, error)) {
       break;
     }
   }
   line = used == 3 ? newest : line;
-  const double deviation = line.deviation(error), speed = line.velocity.norm();
+  const double deviation = line.deviation(error), speed = line.velocity.norm(), noise = std::max(error, noise_);
   double off = sphere * few_positions(used) * deviation;
   off += std::max(0.0, (line.velocity - newest.velocity).norm() - sure * newest.deviation(error));
   off += slip * speed * std::min(1.0, error / other_points);
-  const bool is_far = speed * line.spread > sure * std::max(large_noise, noise_);
-  const bool moves = speed > slowest && is_motion(line, used, std::max(error, noise_), match.moved || is_far);
+  const bool is_far = speed * line.spread > sure * std::max(large_noise, noise);
+  const bool moves = speed > slowest && is_motion(line, used, noise, has_moved || is_far);
   cluster.scatter = newest.scatter;
   cluster.motion = {.uncertainty = std::min(largest_speed_, moves ? off : off + speed), .sets = num};
   if (moves) {
@@ -415,7 +485,7 @@ void CloudMotion::learn_noise(const Set& set) {
   std::vector<std::pair<double, std::size_t>> scatters;
   std::size_t num = 0;
   for (const Cluster& cluster : set.clusters) {
-    if (cluster.scatter >= 0.0) {
+    if (cluster.scatter >= 0.0 && cluster.noise <= VelocityEstimate::noisy) {
       scatters.emplace_back(cluster.scatter, cluster.points.size());
       num += cluster.points.size();
     }
@@ -432,20 +502,20 @@ void CloudMotion::learn_noise(const Set& set) {
 }
 
 void CloudMotion::spread_out(Set& set, const std::vector<RestMemory::Rest>& rests) {
-  const double noise = RestMemory::reach;
   set.motions.resize(rests.size());
   for (std::size_t n = 0; n < rests.size(); ++n) {
-    set.motions[n] = {.uncertainty = std::min(largest_speed_, drift(noise, std::max(rests[n].age, background_age))),
+    set.motions[n] = {.uncertainty = std::min(largest_speed_, drift(RestMemory::reach, std::max(rests[n].age, background_age))),
                       .sets = most_sets};
   }
   for (const Cluster& cluster : set.clusters) {
     const bool is_known = cluster.motion.sets > 1, moves = !cluster.motion.velocity.isZero(0.0);
+    const double within = std::max(RestMemory::reach, cluster.noise);
     for (const int k : cluster.points) {
       const auto n = static_cast<std::size_t>(k);
       PointMotion& motion = set.motions[n];
       motion = cluster.motion;
       if (is_known && !moves && rests[n].sets > 0) {
-        motion.uncertainty = std::min(motion.uncertainty, drift(noise, rests[n].age));
+        motion.uncertainty = std::min(motion.uncertainty, drift(within, rests[n].age));
       } else if (is_known && !moves && cluster.points.size() > stray_points) {
         motion = {.uncertainty = largest_speed_};  // a new part
       }

@@ -25,8 +25,8 @@ class CloudMotion {
  public:
   explicit CloudMotion(double largest_speed) : largest_speed_(largest_speed) {}
 
-  /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last. sight: see VelocityEstimate.
-  std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time, Sight sight);
+  /// Motions of points (3 × N) [m] of a set at `time` [s], later than the last. sight: see VelocityEstimate. noise: (N) [m], 0: not known.
+  std::vector<PointMotion> update(const Eigen::Matrix3Xd& points, double time, Sight sight, const Eigen::VectorXd& noise);
   /// Forgets all, and takes a first look, see VelocityEstimate.
   void begin(const Eigen::Matrix3Xd& points, double time, Sight sight);
   void forget();
@@ -37,6 +37,7 @@ class CloudMotion {
     std::vector<int> points;
     Eigen::Vector3d middle, size;  // centroid and edges of its box [m]
     Eigen::Matrix3Xd sample;       // some of its points [m]
+    double noise = 0.0;            // of its points, as the sensor has it [m]; 0: not known
     PointMotion motion;
     double scatter = -1.0;  // of its places about a line [m]; negative: not known
   };
@@ -44,6 +45,7 @@ class CloudMotion {
     double time;
     Eigen::Matrix3Xd points;
     PointGrid grid;
+    Eigen::VectorXd noise;  // of each point [m]
     Sight sight;
     std::vector<Cluster> clusters;
     std::vector<PointMotion> motions;
@@ -58,6 +60,19 @@ class CloudMotion {
   struct Way {
     std::optional<Eigen::Vector3d> shift = std::nullopt;  // none: too little of them is what both could show
     bool is_cut = false;                                  // The end of a sight cuts one of them.
+    int num = 0;                                          // Points of each that it is found from, at least.
+  };
+  /// Where a cluster was, from its place now on: that is the first one, then come earlier sets, the newest first.
+  struct Track {
+    LineFit<3>::Positions shifts = LineFit<3>::Positions::Zero();  // [m]
+    std::array<double, most_sets> times{};                         // from now on, negative [s]
+    int num = 1;
+    double error = 0.0;      // of a shift [m]
+    bool has_moved = false;  // in the last set
+
+    void add(const Eigen::Vector3d& shift, double time, double shift_error);
+    /// Where it is expected at a time [s].
+    Eigen::Vector3d at(double time) const { return LineFit<3>(shifts, times, num).at(time); }
   };
   /// Shifts at which a cluster may lie in an earlier set [m].
   struct Starts {
@@ -84,7 +99,18 @@ class CloudMotion {
   /// beside it, moved in the last set.
   Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead, bool has_moved) const;
   Match match(const Cluster& cluster, const Set& now, bool among_few) const;
-  void follow_line(Cluster& cluster, const Match& match, const Set& now) const;
+  /// Where a cluster was, by the nearest points of earlier sets.
+  Track track_points(const Cluster& cluster, const Match& match, const Set& now) const;
+  /// The same by the middles of clusters, for noisy ones.
+  Track track_middle(const Cluster& cluster, const Set& now) const;
+  /// Whether it is known by so much noise that the nearest points of another set say little; few points have no middle.
+  static bool is_noisy(const Cluster& cluster) noexcept;
+  /// The cluster of an earlier set that this one was, null: none: as large, and nearest to where it is `expected`, as a shift from here
+  /// [m]. Not told: nearest to here with the velocity it had; not one that is beside it and nearer to another of `now`.
+  const Cluster* same_in(const Set& then, const Cluster& cluster, const Set& now,
+                         std::optional<Eigen::Vector3d> expected) const;
+  /// The velocity that a track shows.
+  void follow(Cluster& cluster, const Track& track, double time) const;
   /// Whether the last set alone tells that a cluster moved, by a way with an error [m], in a duration [s].
   bool has_jumped(const Cluster& cluster, double way, double error, double duration) const;
   /// What the last set alone tells of a cluster that lay in it at a shift [m], with an error [m].

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,7 +51,7 @@ struct VelocityEstimate::Impl {
     return true;
   }
 
-  Result update(const Obstacles& now, double time, Sight sight) {
+  Result update(const Obstacles& now, double time, Sight sight, const Eigen::VectorXd& noise) {
     const Eigen::Index num = now.size();
     Result result{Eigen::Matrix3Xd::Zero(3, num), Eigen::VectorXd::Constant(num, settings.largest_speed),
                   Eigen::VectorXi::Ones(num)};
@@ -72,7 +73,7 @@ struct VelocityEstimate::Impl {
       begin += count;
     }
     shapes = std::move(seen);
-    take_cloud(now, cloud, time, std::move(sight), result);
+    take_cloud(now, cloud, time, std::move(sight), noise, result);
     return result;
   }
 
@@ -91,8 +92,10 @@ struct VelocityEstimate::Impl {
     }
   }
 
-  void take_cloud(const Obstacles& now, const std::vector<Eigen::Index>& cloud, double time, Sight sight, Result& result) {
-    const std::vector<PointMotion> motions = clouds.update(now.points()(Eigen::all, cloud), time, std::move(sight));
+  void take_cloud(const Obstacles& now, const std::vector<Eigen::Index>& cloud, double time, Sight sight,
+                  const Eigen::VectorXd& noise, Result& result) {
+    const std::vector<PointMotion> motions =
+        clouds.update(now.points()(Eigen::all, cloud), time, std::move(sight), noise(cloud));
     for (std::size_t n = 0; n < cloud.size(); ++n) {
       result.velocities.col(cloud[n]) = motions[n].velocity;
       result.uncertainty[cloud[n]] = motions[n].uncertainty;
@@ -109,13 +112,21 @@ VelocityEstimate::~VelocityEstimate() = default;
 VelocityEstimate::VelocityEstimate(VelocityEstimate&&) noexcept = default;
 VelocityEstimate& VelocityEstimate::operator=(VelocityEstimate&&) noexcept = default;
 
-VelocityEstimate::Result VelocityEstimate::update(const Obstacles& now, double time, Sight sight) {
+VelocityEstimate::Result VelocityEstimate::update(const Obstacles& now, double time, Sight sight,
+                                                  const Eigen::VectorXd& noise) {
   require(std::isfinite(time), "time", time, "finite");
+  if (noise.size() != 0 && noise.size() != now.size()) {
+    throw std::invalid_argument("noise has " + std::to_string(noise.size()) + " values, must have one for each of " +
+                                std::to_string(now.size()) + " points, or none");
+  }
+  for (const double sigma : noise) {
+    require(sigma >= 0.0 && std::isfinite(sigma), "noise", sigma, "finite and not negative");
+  }
   if (!(time > impl_->last)) {
     forget();
   }
   impl_->last = time;
-  return impl_->update(now, time, std::move(sight));
+  return impl_->update(now, time, std::move(sight), noise.size() == 0 ? Eigen::VectorXd::Zero(now.size()) : noise);
 }
 
 void VelocityEstimate::begin(const Obstacles& first, double time, Sight sight) {

@@ -255,6 +255,50 @@ BOOST_FIXTURE_TEST_CASE(few_pixels_far_away_count_at_once, Watched) {
   BOOST_TEST((sum / num - Eigen::Vector3d(0.0, -speed, 0.0)).norm() < 0.15);
 }
 
+BOOST_FIXTURE_TEST_CASE(what_comes_slowly_in_much_noise_has_the_velocity_of_its_middle_and_comes_twice, Watched) {
+  constexpr double period = 0.1, speed = 0.2, noise = 0.03, reach = 0.07 + 3.0 * noise;  // [s], [m/s], [m]
+  camera.noise = {noise, 0.0};
+  start();
+  step();
+  int known = 0, twice = 0;
+  double off = 0.0;
+  constexpr int before = 3, first = 6, last = 20;  // images without it; those in which it is looked for
+  for (int n = -before; n < last; ++n) {
+    scene = {};
+    const Eigen::Vector3d centre(-0.1, 0.9 - speed * period * n, 0.5);
+    if (n >= 0) {
+      scene.add_sphere(centre, 0.07);  // some 40 pixels
+    }
+    scene.add_arm(arm.robot(), arm.body(), q);
+    look_with_noise();
+    time += period;
+    step();
+    if (n < first) {
+      continue;
+    }
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int moving = 0, resting = 0;
+    for (const Perception::Cell& cell : perception->cells()) {
+      if ((cell.centre - centre).norm() < reach && cell.age == 0.0 && !cell.velocity.isZero(0.0)) {
+        sum += cell.velocity;
+        ++moving;
+      }
+    }
+    const auto set = said("front");
+    for (Eigen::Index k = 0; k < set->size(); ++k) {
+      resting += (set->points().col(k) - centre).norm() < reach && set->velocities().col(k).isZero(0.0) ? 1 : 0;
+    }
+    if (moving >= 10) {
+      ++known;
+      twice += resting >= moving ? 1 : 0;
+      off += (sum / moving - Eigen::Vector3d(0.0, -speed, 0.0)).norm();
+    }
+  }
+  BOOST_TEST(known >= 0.7 * (last - first), known << " of " << last - first);
+  BOOST_TEST(twice == known);
+  BOOST_TEST(off < 0.1 * known);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_appears_apart_from_what_rests_may_move, Watched) {
   camera.fx = camera.fy = 200.0;
   const Eigen::Vector3d place(0.3, 0.5, 0.6);

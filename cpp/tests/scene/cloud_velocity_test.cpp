@@ -117,6 +117,48 @@ BOOST_AUTO_TEST_CASE(a_ball_has_its_velocity_after_six_sets_with_noise) {
   BOOST_TEST(covered >= 0.9 * num);
 }
 
+BOOST_AUTO_TEST_CASE(a_ball_that_a_noisy_sensor_shows_has_the_velocity_of_its_middle) {
+  // 40 points of a ball of 6 cm, each known to 3 cm along the ray, as of a camera far away; and the floor, known to 12 cm
+  constexpr double noise = 0.03, spacing = 0.1;
+  constexpr int num_body = 40, num_floor = 200, num_seeds = 8, begin = 5, end = 15;
+  constexpr double num_sets = num_seeds * (end - begin);
+  for (const double speed : {0.2, 0.5, 0.0}) {
+    const Eigen::Vector3d velocity = speed * Eigen::Vector3d(1.0, 0.3, 0.0).normalized();
+    double moving = 0.0, covered = 0.0, off = 0.0, off_untold = 0.0;
+    for (unsigned seed = 0; seed < num_seeds; ++seed) {
+      Random random(seed);
+      VelocityEstimate estimate, untold;
+      for (int k = 0; k < end; ++k) {
+        Eigen::Matrix3Xd body = random.matrix(3, num_body), floor = random.matrix(3, num_floor);
+        body.colwise().normalize();
+        body = (0.06 * body).colwise() + spacing * k * velocity;
+        floor.colwise() += Eigen::Vector3d(3.0, 0.0, -1.0);
+        Eigen::VectorXd sigma(num_body + num_floor);
+        sigma << Eigen::VectorXd::Constant(num_body, noise), Eigen::VectorXd::Constant(num_floor, 4.0 * noise);
+        Eigen::Matrix3Xd points = join({body, floor});
+        points.row(0) += random.matrix(1, static_cast<int>(sigma.size())).cwiseProduct(sigma.transpose());
+        const VelocityEstimate::Result told = estimate.update(cloud(points), spacing * k, {}, sigma);
+        const VelocityEstimate::Result other = untold.update(cloud(points), spacing * k);
+        if (k < begin) {
+          continue;
+        }
+        const auto errors = [&](const VelocityEstimate::Result& result) {
+          return (result.velocities.leftCols(num_body).colwise() - velocity).colwise().norm().transpose().eval();
+        };
+        off += errors(told).mean() / num_sets;
+        off_untold += errors(other).mean() / num_sets;
+        moving += (told.velocities.leftCols(num_body).colwise().norm().array() > 0.0).cast<double>().mean() / num_sets;
+        covered += (errors(told).array() <= told.uncertainty.head(num_body).array()).cast<double>().mean() / num_sets;
+      }
+    }
+    BOOST_TEST_INFO(speed << " m/s: " << moving << " moves, off by " << off << ", without its noise " << off_untold);
+    BOOST_TEST((speed > 0.0 ? moving > 0.9 : moving < 0.02));
+    BOOST_TEST(off < (speed > 0.0 ? 0.05 : 0.01));
+    BOOST_TEST((speed == 0.0 || off < 0.5 * off_untold));
+    BOOST_TEST(covered > 0.95);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(two_sets_tell_a_motion_where_a_third_comes_late) {
   constexpr double way = 0.05, noise = 0.003;  // [m]
   const Sight everywhere = [](const Eigen::Vector3d&) { return true; };

@@ -193,4 +193,13 @@ BOOST_AUTO_TEST_CASE(what_a_velocity_estimate_cannot_use_is_refused) {
   });
   VelocityEstimate estimate;
   BOOST_CHECK_THROW(estimate.update(Obstacles::none(), test::not_a_number), std::invalid_argument);
+  const Obstacles box = named(box_at({0.0, 0.0, 0.0}), "box");
+  const auto says = [](const std::string& words) {
+    return [words](const std::invalid_argument& error) { return std::string(error.what()).find(words) == 0; };
+  };
+  BOOST_CHECK_EXCEPTION(estimate.update(box, 0.0, {}, Eigen::VectorXd::Zero(3)), std::invalid_argument,
+                        says("noise has 3 values, must have one for each of 8 points, or none"));
+  BOOST_CHECK_EXCEPTION(estimate.update(box, 0.0, {}, Eigen::VectorXd::Constant(8, -0.01)), std::invalid_argument,
+                        says("noise is -0.010000, must be finite and not negative"));
+  BOOST_TEST(estimate.update(box, 0.0).sets.maxCoeff() == 1);  // A set that was refused is none.
 }

@@ -25,6 +25,10 @@ using Sight = std::function<bool(const Eigen::Vector3d& place)>;
 /// last set has, too: it moves if it has 8 points or more, went farther than 3 cm and 6 standard deviations, and the last set would have
 /// shown most of it where it is now. Such a velocity has `sets` = 2, and an uncertainty of half of it or more.
 ///
+/// Where the sensor's noise is told, clusters of more than three points and a mean noise above `noisy` are compared by their middles from
+/// the third set on: noise hides which point is the nearest, and a middle is known to noise/sqrt(number of points) as far as the same part
+/// is seen. A middle moves, too, where something else than the end of the sight covers or uncovers a part.
+///
 /// Something whose displacement exceeds the largest speed was put elsewhere: it is new. The same points again say nothing new for up to
 /// one and a half spacings of the sets; after that they rest.
 ///
@@ -38,6 +42,8 @@ using Sight = std::function<bool(const Eigen::Vector3d& place)>;
 /// thread that sets obstacles, not into a step.
 class VelocityEstimate {
  public:
+  static constexpr double noisy = 0.015;  ///< Noise above which clusters are compared by their middles [m].
+
   struct Settings {
     double largest_speed = 2.0;  ///< of anything that is not told [m/s], > 0
 
@@ -59,8 +65,9 @@ class VelocityEstimate {
   VelocityEstimate& operator=(VelocityEstimate&&) noexcept;
 
   /// Compares a set, captured at `time` [s], with those before it. A time that is not later than the last one's forgets them first.
-  /// sight: of the sensor at that time; kept while the set is compared. Throws std::invalid_argument if the time is not finite.
-  Result update(const Obstacles& now, double time, Sight sight = {});
+  /// sight: of the sensor at that time; kept while the set is compared. noise: (N) standard deviation of each point [m], as the sensor
+  /// has it; empty: not known. Throws std::invalid_argument if the time is not finite, or noise neither empty nor N finite values >= 0.
+  Result update(const Obstacles& now, double time, Sight sight = {}, const Eigen::VectorXd& noise = {});
 
   /// Forgets all, and takes a first look: points of which most rest, and which later sets leave out. Only the next set is compared with
   /// it: lines through later ones would bend, since they lack points of it. Names and velocities do not count. Throws as `update`.
