@@ -80,7 +80,9 @@ def test_all_requests_reach_the_controller(served: Served) -> None:
         client.remove_obstacle("other", "tracker")
         client.remove_obstacles("tracker")
         client.expect_obstacles("side")
-        assert client.wait(lambda state: "'side' was expected and has not come yet" in client.explain(), timeout=10.0)
+        assert client.wait(
+            lambda state: "'side' was expected and has not come yet" in client.explain(), timeout=10.0
+        )
         client.remove_obstacles("side")
         client.stop_run("a test")
         assert served.server.take_stop() == f"{served.server.clients[0].name} asked for it: a test"
