@@ -447,7 +447,8 @@ void CloudMotion::follow(Cluster& cluster, const Track& track, double time) cons
     }
   }
   line = used == 3 ? newest : line;
-  const double deviation = line.deviation(error), speed = line.velocity.norm(), noise = std::max(error, noise_);
+  const double deviation = line.deviation(error), speed = line.velocity.norm(),
+               noise = is_noisy(cluster) ? error : std::max(error, noise_);
   double off = sphere * few_positions(used) * deviation;
   off += std::max(0.0, (line.velocity - newest.velocity).norm() - sure * newest.deviation(error));
   off += slip * speed * std::min(1.0, error / other_points);
@@ -485,7 +486,7 @@ void CloudMotion::learn_noise(const Set& set) {
   std::vector<std::pair<double, std::size_t>> scatters;
   std::size_t num = 0;
   for (const Cluster& cluster : set.clusters) {
-    if (cluster.scatter >= 0.0 && cluster.noise <= VelocityEstimate::noisy) {
+    if (cluster.scatter >= 0.0) {
       scatters.emplace_back(cluster.scatter, cluster.points.size());
       num += cluster.points.size();
     }
