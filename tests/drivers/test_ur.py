@@ -100,10 +100,11 @@ def test_it_says_what_the_robot_is(driver: UR) -> None:
 
 
 def test_states_are_timed_and_whole(driver: UR) -> None:
+    begin = time.monotonic()
     states = [driver.read(1.0) for _ in range(50)]
     assert None not in states
     times = np.array([state.time for state in states if state is not None])
-    assert 0.0 <= time.monotonic() - times[-1] < 0.2
+    assert begin < times[-1] <= time.monotonic()
     periods = np.diff(times) / 0.002 - [state.lost_cycles for state in states[1:] if state is not None]
     assert np.median(periods) == pytest.approx(
         1.0, abs=0.01
@@ -144,14 +145,14 @@ def test_a_command_that_jumps_is_followed_within_the_acceleration(robot: StandIn
 
 def test_a_protective_stop_ends_a_run_and_another_goes_on(robot: StandInProcess, driver: UR) -> None:
     controller, goal = controller_of(driver, "position", -0.8)
+    begin = time.monotonic()
     report = run(controller, driver, when_it_moves(robot, "protective stop"))
     assert report.end == RunEnd.robot_stopped
     assert "PROTECTIVE_STOP; find out why, then call recover()" in report.why
     with pytest.raises(RobotStopped, match="safety mode 3"):
         driver.start("position")
-    begin = time.monotonic()
     driver.recover()
-    assert time.monotonic() - begin > 0.5 * UNLOCK_AFTER
+    assert time.monotonic() - begin > UNLOCK_AFTER  # by the robot's clock since the stop, which was later
     report = run(controller, driver)
     assert report.end == RunEnd.arrived, report.why
     time.sleep(0.2)
