@@ -35,7 +35,6 @@ void add_mover(std::vector<Mover>& movers, const Mover& cell) {
     known->box.extend(cell.box);
     known->cells += cell.cells;
     known->is_apart = known->is_apart || cell.is_apart;
-    known->balance += cell.balance;
   }
 }
 
@@ -49,9 +48,7 @@ Voxel moved_by(Voxel voxel, const Eigen::Vector3d& way) {
 }
 
 /// Drops few cells that can be the noise of what rests, where nothing larger moves: they come and go beside it, and line up now and then.
-/// Drops many where noise is large and most of them are beside what rests: their middle goes with what covers and uncovers them.
 void drop_noise(std::vector<Mover>& movers) {
-  std::erase_if(movers, [](const Mover& mover) { return mover.balance >= 0; });
   const auto few = std::partition(movers.begin(), movers.end(), [](const Mover& mover) { return mover.cells > few_cells; });
   const auto is_noise = [&](const Mover& mover) {
     return (!mover.is_apart || !(mover.age >= sure_age)) && std::none_of(movers.begin(), few, [&](const Mover& larger) {
@@ -196,14 +193,12 @@ void Perception::Impl::find_velocities(View& view, double time) {
   for (Eigen::Index n = 0; n < candidates.size(); ++n) {
     if (!found.velocities.col(n).isZero(0.0)) {
       const Voxel& voxel = map.voxels()[static_cast<std::size_t>(fresh[static_cast<std::size_t>(n)])];
-      const bool is_beside = map.is_beside_rest(voxel);
       add_mover(view.movers, {.box = Eigen::AlignedBox3d(candidates.points().col(n).eval()),
                               .velocity = found.velocities.col(n),
                               .uncertainty = found.uncertainty[n],
                               .cells = map.edge(voxel) > small_cell ? few_cells + 1 : 1,
                               .age = (found.sets[n] - 1) * (time - view.before),
-                              .is_apart = !is_beside,
-                              .balance = is_beside && noise[n] > VelocityEstimate::noisy ? 1 : -1});
+                              .is_apart = !map.is_beside_rest(voxel)});
     }
   }
   drop_noise(view.movers);

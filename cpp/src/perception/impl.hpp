@@ -26,7 +26,6 @@ struct Mover {
   int cells;                 // that show it; many where they are large
   double age;                // for which it was seen to move [s]
   bool is_apart;             // Some of them are not beside what rests.
-  int balance;               // Number of cells with much noise beside what rests, less that of others.
 };
 
 struct Perception::Impl {

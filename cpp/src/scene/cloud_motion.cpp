@@ -326,6 +326,12 @@ CloudMotion::Starts CloudMotion::starts_in(const Cluster& cluster, const Set& no
   return starts;
 }
 
+bool CloudMotion::is_alike(const Cluster& one, const Cluster& other, double slack) {
+  const std::size_t more = std::max(one.points.size(), other.points.size()),
+                    less = std::min(one.points.size(), other.points.size());
+  return more <= 4 * less && (one.size - other.size).norm() <= 0.5 * std::max(one.size.norm(), other.size.norm()) + slack;
+}
+
 CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bool among_few) const {
   const Set& last = sets_[0];
   const double duration = now.time - last.time;
@@ -335,10 +341,8 @@ CloudMotion::Match CloudMotion::match(const Cluster& cluster, const Set& now, bo
     const Cluster& other = last.clusters[k];
     const Eigen::Vector3d way = other.middle - cluster.middle;
     const double differs = (other.size - cluster.size).norm();
-    const std::size_t more = std::max(other.points.size(), cluster.points.size()),
-                      less = std::min(other.points.size(), cluster.points.size());
-    if (way.norm() > largest_speed_ * duration + 0.5 * differs + PointGrid::edge || more > 4 * less ||
-        differs > 0.5 * std::max(other.size.norm(), cluster.size.norm()) + PointGrid::edge) {
+    if (way.norm() > largest_speed_ * duration + 0.5 * differs + PointGrid::edge ||
+        !is_alike(other, cluster, PointGrid::edge)) {
       continue;
     }
     const Way common = way_back(cluster, now, other, last);
@@ -387,18 +391,13 @@ bool CloudMotion::is_noisy(const Cluster& cluster) noexcept {
 const CloudMotion::Cluster* CloudMotion::same_in(const Set& then, const Cluster& cluster, const Set& now,
                                                  std::optional<Eigen::Vector3d> expected) const {
   const double duration = now.time - then.time, noise = sure * cluster.noise;
-  const auto is_alike = [&](const Cluster& other) {
-    const std::size_t more = std::max(other.points.size(), cluster.points.size()),
-                      less = std::min(other.points.size(), cluster.points.size());
-    return more <= 4 * less && (other.size - cluster.size).norm() <=
-                                   0.5 * std::max(other.size.norm(), cluster.size.norm()) + PointGrid::edge + cluster.noise;
-  };
+  const auto fits = [&](const Cluster& other) { return is_alike(other, cluster, PointGrid::edge + cluster.noise); };
   const Cluster* nearest = nullptr;
   double least = expected ? PointGrid::edge + noise : infinity;
   for (const Cluster& other : then.clusters) {
     const Eigen::Vector3d way = other.middle - cluster.middle;
     const double off = (way - expected.value_or(-duration * other.motion.velocity)).norm();
-    if (off < least && way.norm() <= largest_speed_ * duration + noise && is_alike(other)) {
+    if (off < least && way.norm() <= largest_speed_ * duration + noise && fits(other)) {
       nearest = &other;
       least = off;
     }
@@ -407,7 +406,7 @@ const CloudMotion::Cluster* CloudMotion::same_in(const Set& then, const Cluster&
     return nearest;
   }
   const Eigen::Vector3d place = nearest->middle + duration * nearest->motion.velocity;
-  const auto is_nearer = [&](const Cluster& other) { return (other.middle - place).norm() < least && is_alike(other); };
+  const auto is_nearer = [&](const Cluster& other) { return (other.middle - place).norm() < least && fits(other); };
   return std::any_of(now.clusters.begin(), now.clusters.end(), is_nearer) ? nullptr : nearest;
 }
 

@@ -98,6 +98,8 @@ class CloudMotion {
   /// Where to look for a cluster of `now` in an earlier set, in which it is expected at a shift `ahead` [m]. has_moved: it, or what was
   /// beside it, moved in the last set.
   Starts starts_in(const Cluster& cluster, const Set& now, const Set& then, const Eigen::Vector3d& ahead, bool has_moved) const;
+  /// Whether two clusters have as many points, within a factor of four, and are as large, within half of it and a slack [m].
+  static bool is_alike(const Cluster& one, const Cluster& other, double slack);
   Match match(const Cluster& cluster, const Set& now, bool among_few) const;
   /// Where a cluster was, by the nearest points of earlier sets.
   Track track_points(const Cluster& cluster, const Match& match, const Set& now) const;
@@ -105,8 +107,8 @@ class CloudMotion {
   Track track_middle(const Cluster& cluster, const Set& now) const;
   /// Whether it is known by so much noise that the nearest points of another set say little; few points have no middle.
   static bool is_noisy(const Cluster& cluster) noexcept;
-  /// The cluster of an earlier set that this one was, null: none: as large, and nearest to where it is `expected`, as a shift from here
-  /// [m]. Not told: nearest to here with the velocity it had; not one that is beside it and nearer to another of `now`.
+  /// The cluster of an earlier set that this one was; null: none is as large and near enough. `expected`: where it should be, as a shift
+  /// from here [m]. Without it, each one is taken on by its own velocity, and one that fits another cluster of `now` better is left to it.
   const Cluster* same_in(const Set& then, const Cluster& cluster, const Set& now,
                          std::optional<Eigen::Vector3d> expected) const;
   /// The velocity that a track shows.

@@ -54,6 +54,7 @@ def test_a_box_that_is_behind_its_time_hears() -> None:
         os.write(writer, b"x")
         thread.join(10.0)
         assert not thread.is_alive()
+    assert box.time > 0.0
     for end in (reader, writer):
         os.close(end)
 
