@@ -263,7 +263,7 @@ Obstacles Perception::Impl::moving_balls(const SeenImage& seen) {
     const Voxel& voxel = map.voxels()[n];
     const double age = seen.time - voxel.last;
     const bool rested = uncertainties[n] == 0.0f && velocities[n].isZero(0.0f);
-    const bool was_seen_empty = voxel.free_images > 0 || voxel.missed_images > 0;
+    const bool was_seen_empty = voxel.free_images > 0 || voxel.missed_samples > 0;
     if (voxel.camera != number || rested || was_seen_empty || !(age > 0.0 && age <= moves_unseen)) {
       continue;
     }

@@ -1,6 +1,7 @@
 #include "sidestep/perception/voxel_map.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -20,18 +21,35 @@ constexpr float settled_shrinks_by = 0.5f;  // The same of one that has been see
 constexpr double second_within = 0.5;       // Time within which a second image must show a voxel with few pixels [s],
 constexpr int longest_gap = 1;              // with at most so many images of the camera in between.
 constexpr double noise_beyond = 3.0;        // Noise of a depth that is behind a cell, in standard deviations.
-constexpr int missed_at_most = 5;         // Images that see the surface nearby, and not in the cell, after which it was noise.
-constexpr double least_share = 0.1;       // Share of a cell's pixels that must show it before it counts at once.
-constexpr double settled_noise = 2.0;     // Noise of depths that explains a cell by one nearby, in standard deviations.
-constexpr double half_diagonal = 0.8661;  // of a cell, in edges
-constexpr int samples_of_cell = 5;        // Pixels of a cell that are looked at: its middle, and four around it,
-constexpr double around = 0.35;           // so far from it, in sizes of the box.
-constexpr int samples_free = 3;           // of which so many must be free, and none hidden
+constexpr int missed_at_most = 5;           // Images full of a surface nearby, and not in the cell, after which it was noise.
+constexpr double least_share = 0.1;         // Share of a cell's pixels that must show it before it counts at once.
+constexpr double settled_noise = 2.0;       // Noise of depths that explains a cell by one nearby, in standard deviations.
+constexpr double half_diagonal = 0.8661;    // of a cell, in edges
+constexpr int samples_of_cell = 5;          // Pixels of a cell that are looked at: its middle, and four around it,
+constexpr double around = 0.35;             // so far from it, in sizes of the box, or edges.
+constexpr int samples_free = 3;             // of which so many must be free, and none hidden
 
 constexpr double spread = 2.0;          // Noise of depths over which a surface is spread along the ray, in standard deviations,
 constexpr double neighbourhood = 3.0;   // and width of what is looked at around a cell that it reaches [edges],
 constexpr double samples_across = 6.0;  // by so many pixels across, or somewhat more.
 constexpr double tail = 1.25;  // Mean distance of what is looked at from the cell, at most: 2 sigma off a surface [sigma].
+
+/// Indices of the pixels that show the samples of a cell: its middle, and four places so far from it [m]; -1: not in the image.
+std::array<std::ptrdiff_t, samples_of_cell> sample_pixels(const DepthCamera& camera, const Eigen::Vector3d& middle,
+                                                          double offset) noexcept {
+  const Eigen::Vector2d pixel = camera.project(middle);
+  const double offset_u = offset * camera.fx / middle.z(), offset_v = offset * camera.fy / middle.z();
+  std::array<std::ptrdiff_t, samples_of_cell> pixels;
+  for (int sample = 0; sample < samples_of_cell; ++sample) {
+    const double side_u = sample == 0 ? 0.0 : (sample % 2 == 0 ? 1.0 : -1.0),
+                 side_v = sample == 0 ? 0.0 : (sample < 3 ? 1.0 : -1.0);
+    const double u = std::round(pixel.x() + side_u * offset_u), v = std::round(pixel.y() + side_v * offset_v);
+    const bool is_inside = u >= 0.0 && v >= 0.0 && u < camera.width && v < camera.height;
+    pixels[static_cast<std::size_t>(sample)] =
+        is_inside ? static_cast<std::ptrdiff_t>(v) * camera.width + static_cast<std::ptrdiff_t>(u) : -1;
+  }
+  return pixels;
+}
 
 constexpr std::uint16_t bit(std::uint8_t camera) noexcept { return static_cast<std::uint16_t>(1u << camera); }
 
@@ -161,7 +179,8 @@ void VoxelMap::add_row(const SeenImage& seen, int v) {
 }
 
 void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
-  const bool in_a_row = voxel.gap <= longest_gap && voxel.missed_images <= 1 && seen.time - voxel.last <= second_within;
+  const bool in_a_row =
+      voxel.gap <= longest_gap && voxel.missed_samples <= samples_of_cell && seen.time - voxel.last <= second_within;
   if (!voxel.counts && !in_a_row) {  // depths that fly beside an edge come back to a cell now and then
     voxel.first = seen.time;
     voxel.shown_images = 0;
@@ -176,7 +195,7 @@ void VoxelMap::end_frame(Voxel& voxel, const SeenImage& seen) noexcept {
   voxel.shown_by |= bit(seen.number);
   voxel.error = static_cast<float>(seen.camera.translation_error + seen.camera.rotation_error * distance);
   voxel.last = std::max(voxel.last, seen.time);
-  voxel.free_images = voxel.missed_images = voxel.gap = 0;
+  voxel.free_images = voxel.missed_samples = voxel.gap = 0;
   voxel.shown_images = static_cast<std::uint8_t>(std::min(voxel.shown_images + 1, 255));
   voxel.is_hidden = false;
 }
@@ -242,22 +261,16 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
   if (middle.z() <= seen.camera.near + half) {
     return Sight::elsewhere;
   }
-  const Eigen::Vector2d pixel = seen.camera.project(middle);
   // The samples are within the box: a cell beside the edge of something nearer is not hidden where what was in it is not.
-  const double offset = around * (voxel.high_corner() - voxel.low_corner()).maxCoeff() / middle.z();
-  const double offset_u = offset * seen.camera.fx, offset_v = offset * seen.camera.fy;
+  const double offset = around * (voxel.high_corner() - voxel.low_corner()).maxCoeff();
   const double noise = noise_beyond * seen.camera.noise.sigma(middle.z());
   int num_free = 0, num_inside = 0, num_surface = 0;
-  for (int sample = 0; sample < samples_of_cell; ++sample) {
-    const double side_u = sample == 0 ? 0.0 : (sample % 2 == 0 ? 1.0 : -1.0),
-                 side_v = sample == 0 ? 0.0 : (sample < 3 ? 1.0 : -1.0);
-    const double u = std::round(pixel.x() + side_u * offset_u), v = std::round(pixel.y() + side_v * offset_v);
-    if (!(u >= 0.0 && v >= 0.0 && u < seen.camera.width && v < seen.camera.height)) {
+  for (const std::ptrdiff_t pixel : sample_pixels(seen.camera, middle, offset)) {
+    if (pixel < 0) {
       continue;
     }
     ++num_inside;
-    const std::size_t i =
-        static_cast<std::size_t>(v) * static_cast<std::size_t>(seen.camera.width) + static_cast<std::size_t>(u);
+    const auto i = static_cast<std::size_t>(pixel);
     const PixelLabel label = seen.image.labels()[i];
     if (label == PixelLabel::nothing || label == PixelLabel::edge) {
       continue;
@@ -277,6 +290,17 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
                                       : Sight::hidden;
 }
 
+int VoxelMap::num_surface(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {
+  const Eigen::Vector3d middle = X_CW * voxel.middle();
+  const double edge = this->edge(voxel), most = half_diagonal * edge + noise_beyond * seen.camera.noise.sigma(middle.z());
+  // The samples are within the cell: few pixels make a small box, and would be as many samples as its cell has.
+  const auto pixels = sample_pixels(seen.camera, middle, around * edge);
+  return static_cast<int>(std::count_if(pixels.begin(), pixels.end(), [&](std::ptrdiff_t pixel) {
+    const auto i = static_cast<std::size_t>(pixel);
+    return pixel >= 0 && seen.image.labels()[i] == PixelLabel::obstacle && std::abs(seen.depth[i] - middle.z()) <= most;
+  }));
+}
+
 void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept {
   voxel.shown_by &= static_cast<std::uint16_t>(~bit(seen.number));
   voxel.gap = static_cast<std::uint8_t>(std::min(voxel.gap + (seen.number == voxel.camera ? 1 : 0), 255));
@@ -288,9 +312,12 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
     }
     return;
   }
-  if (what == Sight::surface && ++voxel.missed_images >= (voxel.counts ? missed_at_most : 2)) {
-    remove(voxel);
-    return;
+  if (what == Sight::surface) {
+    voxel.missed_samples = static_cast<std::uint8_t>(voxel.missed_samples + num_surface(voxel, seen, X_CW));
+    if (voxel.missed_samples >= samples_of_cell * (voxel.counts ? missed_at_most : 2)) {
+      remove(voxel);
+      return;
+    }
   }
   voxel.is_hidden = voxel.is_hidden || what == Sight::hidden;
   const double kept = may_move(voxel) ? std::min(settings_.memory, kept_at_least + kept_per_seen * (voxel.last - voxel.first))

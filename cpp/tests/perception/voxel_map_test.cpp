@@ -130,6 +130,45 @@ BOOST_FIXTURE_TEST_CASE(noise_does_not_make_a_surface_thick, Noisy) {
   BOOST_TEST(most_beyond(8) < 0.04);
 }
 
+BOOST_FIXTURE_TEST_CASE(a_pixel_of_a_cell_that_misses_it_says_less_than_all_of_them, Noisy) {
+  test::DepthScene scene;
+  scene.add_sphere({wall_at.x() - 100.0, 0.0, 0.5}, 100.0);
+  const std::vector<float> wall = scene.image(camera);
+  const int middle = 60 * 160 + 80;
+  const Eigen::Vector3d point =
+      camera.pose * Eigen::Vector3d(rays.x()[middle] * wall[middle], rays.y()[middle] * wall[middle], wall[middle]);
+  const auto cell = [&] { return map.voxel_of(point.cast<float>().eval().data()); };
+  /// An image of a surface nearer by so much [m], in another cell along the ray, with all pixels or none but the middle one.
+  const auto show = [&](float nearer, bool whole) {
+    pixels.assign(wall.size(), 0.0f);
+    for (std::size_t i = 0; i < wall.size(); ++i) {
+      pixels[i] = whole || i == middle ? wall[i] - nearer : 0.0f;
+    }
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    add();
+  };
+  const auto show_it = [&] {  // for long enough to be known to rest
+    for (int n = 0; n < 6; ++n) {
+      show(0.0f, true);
+    }
+  };
+  show_it();
+  BOOST_REQUIRE(cell() >= 0);
+  for (int n = 0; n < 4; ++n) {
+    show(0.03f, true);
+  }
+  BOOST_TEST(cell() >= 0);
+  show(0.03f, true);
+  BOOST_TEST(cell() < 0);  // five images that show the surface elsewhere: it was noise
+  show_it();
+  for (int n = 0; n < 24; ++n) {
+    show(0.03f, false);
+  }
+  BOOST_TEST(cell() >= 0);
+  show(0.03f, false);
+  BOOST_TEST(cell() < 0);  // as many pixels
+}
+
 BOOST_FIXTURE_TEST_CASE(boxes_hold_all_points_that_were_seen, Mapped) {
   add(wall_and_ball());
   BOOST_TEST(near(ball_at, 0.12) > 20);

@@ -26,14 +26,14 @@ struct Voxel {
   int pixels;                         ///< Number of pixels of that image that showed it.
   std::uint8_t camera;                ///< Camera that showed it last.
   std::uint16_t shown_by;             ///< Cameras whose last image shows it, as bits.
-  std::uint8_t missed_images;         ///< Images since then that saw a surface there, and nothing in the cell.
-  std::uint8_t free_images;           ///< Images in a row that saw through it.
-  std::uint8_t gap;                   ///< Images of its camera since the last one that showed it.
-  std::uint8_t shown_images;          ///< Images that showed it, at most 255.
-  bool counts;                        ///< It is an obstacle; else a second image must show it.
-  bool moves;                         ///< What was in it moved when it was seen last.
-  std::uint16_t cut_by;               ///< Cameras whose last image of it has the arm beside it, which may hide a part; as bits.
-  bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
+  std::uint8_t missed_samples;  ///< Samples of the cell, of images since then, that saw a surface there, and not in the cell.
+  std::uint8_t free_images;     ///< Images in a row that saw through it.
+  std::uint8_t gap;             ///< Images of its camera since the last one that showed it.
+  std::uint8_t shown_images;    ///< Images that showed it, at most 255.
+  bool counts;                  ///< It is an obstacle; else a second image must show it.
+  bool moves;                   ///< What was in it moved when it was seen last.
+  std::uint16_t cut_by;         ///< Cameras whose last image of it has the arm beside it, which may hide a part; as bits.
+  bool is_hidden;               ///< The last image that could have shown it did not, since something is in front of it.
 
   Eigen::Vector3d low_corner() const { return Eigen::Map<const Eigen::Vector3f>(low).cast<double>(); }
   Eigen::Vector3d high_corner() const { return Eigen::Map<const Eigen::Vector3f>(high).cast<double>(); }
@@ -118,6 +118,8 @@ class VoxelMap {
   /// What an image says of a cell that it did not show; `surface`: its depth is that of the cell, but for noise.
   enum class Sight { elsewhere, hidden, surface, free };
   Sight sight(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
+  /// Number of samples of a cell, of five, that show a surface where the cell is, but for noise.
+  int num_surface(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept;
   void look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) noexcept;
   /// Whether something has been seen for long in the cell of a point.
   bool rests_at(const Eigen::Vector3d& point) const noexcept;
