@@ -293,11 +293,16 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
 int VoxelMap::num_surface(const Voxel& voxel, const SeenImage& seen, const Eigen::Isometry3d& X_CW) const noexcept {
   const Eigen::Vector3d middle = X_CW * voxel.middle();
   const double edge = this->edge(voxel), most = half_diagonal * edge + noise_beyond * seen.camera.noise.sigma(middle.z());
-  // The samples are within the cell: few pixels make a small box, and would be as many samples as its cell has.
+  // The samples are as far apart as the cell is wide: few pixels make a small box, in which one pixel would count five times.
   const auto pixels = sample_pixels(seen.camera, middle, around * edge);
   return static_cast<int>(std::count_if(pixels.begin(), pixels.end(), [&](std::ptrdiff_t pixel) {
+    if (pixel < 0) {
+      return false;
+    }
     const auto i = static_cast<std::size_t>(pixel);
-    return pixel >= 0 && seen.image.labels()[i] == PixelLabel::obstacle && std::abs(seen.depth[i] - middle.z()) <= most;
+    const PixelLabel label = seen.image.labels()[i];
+    const bool shows = label != PixelLabel::nothing && label != PixelLabel::edge && label != PixelLabel::arm;
+    return shows && std::abs(seen.sees_to(i) - middle.z()) <= most;
   }));
 }
 
@@ -313,7 +318,8 @@ void VoxelMap::look_for(Voxel& voxel, const SeenImage& seen, const Eigen::Isomet
     return;
   }
   if (what == Sight::surface) {
-    voxel.missed_samples = static_cast<std::uint8_t>(voxel.missed_samples + num_surface(voxel, seen, X_CW));
+    const int num = voxel.counts ? std::max(1, num_surface(voxel, seen, X_CW)) : samples_of_cell;
+    voxel.missed_samples = static_cast<std::uint8_t>(voxel.missed_samples + num);
     if (voxel.missed_samples >= samples_of_cell * (voxel.counts ? missed_at_most : 2)) {
       remove(voxel);
       return;

@@ -130,43 +130,63 @@ BOOST_FIXTURE_TEST_CASE(noise_does_not_make_a_surface_thick, Noisy) {
   BOOST_TEST(most_beyond(8) < 0.04);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_pixel_of_a_cell_that_misses_it_says_less_than_all_of_them, Noisy) {
-  test::DepthScene scene;
-  scene.add_sphere({wall_at.x() - 100.0, 0.0, 0.5}, 100.0);
-  const std::vector<float> wall = scene.image(camera);
-  const int middle = 60 * 160 + 80;
-  const Eigen::Vector3d point =
-      camera.pose * Eigen::Vector3d(rays.x()[middle] * wall[middle], rays.y()[middle] * wall[middle], wall[middle]);
-  const auto cell = [&] { return map.voxel_of(point.cast<float>().eval().data()); };
-  /// An image of a surface nearer by so much [m], in another cell along the ray, with all pixels or none but the middle one.
-  const auto show = [&](float nearer, bool whole) {
-    pixels.assign(wall.size(), 0.0f);
-    for (std::size_t i = 0; i < wall.size(); ++i) {
-      pixels[i] = whole || i == middle ? wall[i] - nearer : 0.0f;
-    }
-    image.take(camera, {std::span<const float>(pixels), 1.0});
-    add();
-  };
-  const auto show_it = [&] {  // for long enough to be known to rest
+/// A cell at a wall that rests, and images that show something else there.
+struct Missed : Noisy {
+  std::vector<float> wall;
+  Eigen::Vector3d point;   // in the cell
+  std::size_t middle = 0;  // the pixel of the middle of its box
+
+  Missed() {
+    test::DepthScene scene;
+    scene.add_sphere({wall_at.x() - 100.0, 0.0, 0.5}, 100.0);
+    wall = scene.image(camera);
+  }
+  int cell() const { return map.voxel_of(point.cast<float>().eval().data()); }
+  /// Shows the wall alone, for long enough to be known to rest.
+  void show_wall() {
     for (int n = 0; n < 6; ++n) {
       show(0.0f, true);
     }
-  };
-  show_it();
-  BOOST_REQUIRE(cell() >= 0);
-  for (int n = 0; n < 4; ++n) {
-    show(0.03f, true);
+    const std::size_t any = 63 * 160 + 83;
+    point = camera.pose * Eigen::Vector3d(rays.x()[any] * wall[any], rays.y()[any] * wall[any], wall[any]);
+    BOOST_REQUIRE(cell() >= 0);
+    const Voxel& voxel = map.voxels()[static_cast<std::size_t>(cell())];
+    const Eigen::Vector2d pixel = camera.project(camera.pose.inverse() * voxel.middle());
+    middle = static_cast<std::size_t>(std::round(pixel.y()) * 160.0 + std::round(pixel.x()));
   }
-  BOOST_TEST(cell() >= 0);
-  show(0.03f, true);
-  BOOST_TEST(cell() < 0);  // five images that show the surface elsewhere: it was noise
-  show_it();
-  for (int n = 0; n < 24; ++n) {
-    show(0.03f, false);
+  /// An image of all pixels, or of none but the middle one, that shows what is farther away by so much [m].
+  void show(float farther, bool whole) {
+    pixels.assign(wall.size(), 0.0f);
+    for (std::size_t i = 0; i < wall.size(); ++i) {
+      pixels[i] = whole || i == middle ? wall[i] + farther : 0.0f;
+    }
+    image.take(camera, {std::span<const float>(pixels), 1.0});
+    add();
   }
-  BOOST_TEST(cell() >= 0);
-  show(0.03f, false);
-  BOOST_TEST(cell() < 0);  // as many pixels
+  /// Number of such images after which the cell is gone, at most 100.
+  int gone_after(float farther, bool whole) {
+    map.clear();
+    show_wall();
+    for (int n = 1; n < 100; ++n) {
+      show(farther, whole);
+      if (cell() < 0) {
+        return n;
+      }
+    }
+    return 100;
+  }
+};
+
+BOOST_FIXTURE_TEST_CASE(a_pixel_of_a_cell_that_misses_it_says_less_than_all_of_them, Missed) {
+  BOOST_TEST(gone_after(-0.03f, true) == 5);    // They show the surface in another cell: this one was noise.
+  BOOST_TEST(gone_after(-0.03f, false) == 25);  // as many pixels
+  BOOST_TEST(gone_after(0.5f, true) == 2);      // It is seen through.
+  BOOST_TEST(gone_after(0.5f, false) == 25);    // One of five samples is free, and no more is seen.
+}
+
+BOOST_FIXTURE_TEST_CASE(what_was_at_the_end_of_the_range_goes, Missed) {
+  camera.far = wall[60 * 160 + 80] + 0.03;
+  BOOST_TEST(gone_after(0.5f, true) == 5);
 }
 
 BOOST_FIXTURE_TEST_CASE(boxes_hold_all_points_that_were_seen, Mapped) {

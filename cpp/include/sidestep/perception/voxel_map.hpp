@@ -68,7 +68,8 @@ struct SeenImage {
 /// An image adds its points to their cells. Then each cell that it did not show is projected into it: where its depth is behind the
 /// whole cell, the cell was seen through, and after `clear_after` such images in a row it is free. Where something is in front of it, the
 /// arm is, or nothing was seen, it is hidden, and kept for `memory`; what moved, or was seen for less than 0.1 s or by fewer than three
-/// images, for 0.3 s and ten times as long as it was seen: it has left most of its cells.
+/// images, for 0.3 s and ten times as long as it was seen: it has left most of its cells. Where the depth is that of the cell, but for
+/// noise, the cell is missed by as many of its five samples as show that, and after 25 since it was shown last it was noise.
 class VoxelMap {
  public:
   static constexpr double background_after = 1.0;  ///< Time for which a voxel must have been seen to be background [s].
