@@ -136,8 +136,7 @@ void ArmMask::measure(const Seen& core, const DepthCamera& camera, const CameraR
       const float x = rays.x()[i], y = rays.y()[i], z = image.depth()[i];
       const float a = x * (core.a[0] * x + core.a[2] * y + core.a[3]) + y * (core.a[1] * y + core.a[4]) + core.a[5];
       const float b = core.b[0] * x + core.b[1] * y + core.b[2];
-      if (b * b < a * core.gamma || b <= 0.0f || image.labels()[i] == PixelLabel::nothing ||
-          image.labels()[i] == PixelLabel::edge) {
+      if (b * b < a * core.gamma || b <= 0.0f || !has_surface(image.labels()[i])) {
         continue;
       }
       ++residual_.rays;

@@ -18,7 +18,7 @@ bool meets_arm(const DepthImage& image, int u, int v, int step_u, int step_v) no
       return false;
     }
     const PixelLabel label = image.labels()[static_cast<std::ptrdiff_t>(v) * image.width() + u];
-    if (label != PixelLabel::nothing && label != PixelLabel::edge) {
+    if (has_surface(label)) {
       return label == PixelLabel::arm;
     }
   }

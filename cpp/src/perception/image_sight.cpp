@@ -26,7 +26,7 @@ ImageSight::ImageSight(const DepthCamera& camera, const Eigen::Isometry3d& X_WC,
           const std::ptrdiff_t i = static_cast<std::ptrdiff_t>(v) * image.width() + u;
           const PixelLabel label = image.labels()[i];
           ++num;  // beside the arm there are pixels without depths, too
-          hidden += label == PixelLabel::arm || label == PixelLabel::nothing || label == PixelLabel::edge ? 1 : 0;
+          hidden += label == PixelLabel::arm || !has_surface(label) ? 1 : 0;
           if (label == PixelLabel::arm) {
             is_arm = true;
             nearest = std::min(nearest, front[i]);

@@ -49,7 +49,7 @@ void UnseenSpace::add(const SeenImage& seen) noexcept {
         const std::size_t n = static_cast<std::size_t>(std::lround(pixel.y())) * static_cast<std::size_t>(seen.camera.width) +
                               static_cast<std::size_t>(std::lround(pixel.x()));
         const PixelLabel label = seen.image.labels()[n];
-        if (label == PixelLabel::nothing || label == PixelLabel::edge) {
+        if (!has_surface(label)) {
           continue;
         }
         if (seen.sees_to(n) > p.z() + std::max(0.0, half - noise_of_sight * seen.camera.noise.sigma(p.z()))) {

@@ -272,7 +272,7 @@ VoxelMap::Sight VoxelMap::sight(const Voxel& voxel, const SeenImage& seen, const
     ++num_inside;
     const auto i = static_cast<std::size_t>(pixel);
     const PixelLabel label = seen.image.labels()[i];
-    if (label == PixelLabel::nothing || label == PixelLabel::edge) {
+    if (!has_surface(label)) {
       continue;
     }
     const double sees_to = seen.sees_to(i);
@@ -301,8 +301,7 @@ int VoxelMap::num_surface(const Voxel& voxel, const SeenImage& seen, const Eigen
     }
     const auto i = static_cast<std::size_t>(pixel);
     const PixelLabel label = seen.image.labels()[i];
-    const bool shows = label != PixelLabel::nothing && label != PixelLabel::edge && label != PixelLabel::arm;
-    return shows && std::abs(seen.sees_to(i) - middle.z()) <= most;
+    return has_surface(label) && label != PixelLabel::arm && std::abs(seen.sees_to(i) - middle.z()) <= most;
   }));
 }
 

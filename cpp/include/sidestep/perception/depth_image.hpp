@@ -22,6 +22,9 @@ enum class PixelLabel : std::uint8_t {
   outside,    ///< beyond the range of the camera, which sees to its end
 };
 
+/// Whether the depth of a pixel is that of a surface, the arm's included.
+constexpr bool has_surface(PixelLabel label) noexcept { return label != PixelLabel::nothing && label != PixelLabel::edge; }
+
 /// Depths as a camera gives them, row by row: numbers in units of `unit` [m], or metres. 0, NaN and infinity: nothing seen.
 struct RawDepth {
   std::variant<std::span<const std::uint16_t>, std::span<const float>> pixels;

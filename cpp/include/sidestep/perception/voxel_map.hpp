@@ -26,14 +26,14 @@ struct Voxel {
   int pixels;                         ///< Number of pixels of that image that showed it.
   std::uint8_t camera;                ///< Camera that showed it last.
   std::uint16_t shown_by;             ///< Cameras whose last image shows it, as bits.
-  std::uint8_t missed_samples;  ///< Samples of the cell, of images since then, that saw a surface there, and not in the cell.
-  std::uint8_t free_images;     ///< Images in a row that saw through it.
-  std::uint8_t gap;             ///< Images of its camera since the last one that showed it.
-  std::uint8_t shown_images;    ///< Images that showed it, at most 255.
-  bool counts;                  ///< It is an obstacle; else a second image must show it.
-  bool moves;                   ///< What was in it moved when it was seen last.
-  std::uint16_t cut_by;         ///< Cameras whose last image of it has the arm beside it, which may hide a part; as bits.
-  bool is_hidden;               ///< The last image that could have shown it did not, since something is in front of it.
+  std::uint8_t missed_samples;        ///< Samples since then that saw a surface there, and not in the cell.
+  std::uint8_t free_images;           ///< Images in a row that saw through it.
+  std::uint8_t gap;                   ///< Images of its camera since the last one that showed it.
+  std::uint8_t shown_images;          ///< Images that showed it, at most 255.
+  bool counts;                        ///< It is an obstacle; else a second image must show it.
+  bool moves;                         ///< What was in it moved when it was seen last.
+  std::uint16_t cut_by;               ///< Cameras whose last image of it has the arm beside it, which may hide a part; as bits.
+  bool is_hidden;                     ///< The last image that could have shown it did not, since something is in front of it.
 
   Eigen::Vector3d low_corner() const { return Eigen::Map<const Eigen::Vector3f>(low).cast<double>(); }
   Eigen::Vector3d high_corner() const { return Eigen::Map<const Eigen::Vector3f>(high).cast<double>(); }
